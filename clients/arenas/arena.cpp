@@ -3,11 +3,15 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
 #include <limits>
 #include <optional>
 
 #include "core/base/error.hpp"
+#include "core/base/pose.hpp"
 #include "core/base/state_hash.hpp"
+#include "core/federation/frame_check.hpp"
+#include "core/observations/variable_sampler.hpp"
 #include "idl/manifest.pb.h"
 #include "services/behaviours/host_memory.hpp"
 
@@ -59,13 +63,30 @@ std::vector<behaviours::BehavioursEngine::Failure> Arena::failures() const {
   return failures;
 }
 
-void Arena::send(const OverheadPacket& packet) {
-  Directive directive;
+void Arena::add(Directive directive) {
   directive.sequence_number = directives_++;
   directive.tick = now();
+  schedule_.add(directive);
+}
+
+void Arena::send(const OverheadPacket& packet) {
+  Directive directive;
   directive.kind = DirectiveKind::kOverheadInput;
   directive.packet = packet;
-  schedule_.add(directive);
+  add(directive);
+}
+
+void Arena::place(const Relocation& where) {
+  Directive directive;
+  directive.kind = DirectiveKind::kRelocation;
+  directive.relocation = where;
+  double& heading_rad = directive.relocation.pose.heading_rad;
+  heading_rad = wrapped(std::remainder(heading_rad, 2 * kPi));
+  if (const char* const why = defect(directive.relocation, *plan_))
+    throw UserError(fmt::format("{} {} cannot be placed at {:g}, {:g}: {}",
+                                where.movable ? "movable body" : "robot", where.body, where.pose.x_mm,
+                                where.pose.y_mm, why));
+  add(directive);
 }
 
 const VariablePlace* Arena::place_of(std::size_t index, std::uint32_t robot) const {
@@ -83,6 +104,8 @@ std::string Arena::name_of(std::size_t index) const {
 }
 
 double Arena::variable(std::size_t index, std::uint32_t robot) const {
+  if (name_of(index) == kBatteryVariable && !plan_->firmware(robot) && !plan_->tracked(robot))
+    return host_of(robot).battery_V(robot);
   const VariablePlace* const place = place_of(index, robot);
   if (place == nullptr) return std::numeric_limits<double>::quiet_NaN();
   const std::optional<std::uint64_t> raw = place->fetch(robot, behaviours::HostMemory(host_of(robot)));

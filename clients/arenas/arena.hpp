@@ -1,7 +1,7 @@
 /// An experiment whose caller decides when it steps: for optimisers, learning, and whatever else is a loop around a swarm.
 ///
-/// It has the results of a local run: after the same number of ticks, the same state hash. Messages to robots and changes of
-/// their variables are inputs beside the experiment; a run that a recording describes has no such changes of variables.
+/// It has the results of a local run: after the same number of ticks, the same state hash. Messages to robots, placements and
+/// changes of variables are inputs beside the experiment; a run that a recording describes has no such changes of variables.
 #pragma once
 
 #include <cstdint>
@@ -43,8 +43,12 @@ class Arena {
   /// The packet reaches the overhead controller in the next step.
   void send(const OverheadPacket& packet);
 
+  /// The robot or movable body stands there after the next step, as in a run that is told so at this tick. Throws UserError where it
+  /// cannot: no such body, a real robot, outside the arena, in an obstacle. `where.pose.heading_rad`: any angle.
+  void place(const Relocation& where);
+
   [[nodiscard]] std::size_t variables() const { return places_.size(); }
-  /// NaN where the robot's program has no such variable, or it runs as firmware.
+  /// NaN where the robot's program has no such variable, or it runs as firmware. Batteries: core/observations/variable_sampler.hpp.
   [[nodiscard]] double variable(std::size_t index, std::uint32_t robot) const;
   /// Throws UserError where variable() would be NaN, or the variable cannot hold the value.
   void set_variable(std::size_t index, std::uint32_t robot, double value);
@@ -54,6 +58,7 @@ class Arena {
   }
 
  private:
+  void add(Directive directive);
   [[nodiscard]] const VariablePlace* place_of(std::size_t index, std::uint32_t robot) const;
   [[nodiscard]] behaviours::BehavioursEngine& host_of(std::uint32_t robot) const;
   [[nodiscard]] std::string name_of(std::size_t index) const;

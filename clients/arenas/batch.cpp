@@ -104,6 +104,11 @@ void Batch::send(std::span<const std::uint32_t> arenas, const OverheadPacket& pa
   for (const std::uint32_t arena : arenas) arenas_.at(arena)->send(packet);
 }
 
+void Batch::place(std::span<const std::uint32_t> arenas, const Relocation& where) {
+  // All have the same arena and bodies, so what the first takes all take.
+  for (const std::uint32_t arena : arenas) arenas_.at(arena)->place(where);
+}
+
 void Batch::set_variable(std::size_t index) {
   const std::uint32_t robots = plan().robots();
   const std::span<const double> wanted = arrays_.array<const double>(kWanted);

@@ -38,6 +38,8 @@ class Batch {
   /// Arenas begin anew, each with the seed beside it.
   void reset(std::span<const std::pair<std::uint32_t, std::uint64_t>> seeds);
   void send(std::span<const std::uint32_t> arenas, const OverheadPacket& packet);
+  /// As Arena::place() in each of them. Throws UserError; then none has taken it.
+  void place(std::span<const std::uint32_t> arenas, const Relocation& where);
   /// Sets the variable to `wanted`, except where that is NaN. Throws UserError, with the arena, where it cannot; then some robots
   /// may have been changed.
   void set_variable(std::size_t index);

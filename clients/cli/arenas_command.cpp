@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <iostream>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numeric>
@@ -62,15 +63,17 @@ class Requests {
   /// The answer to a request. Throws UserError, RunError, and nlohmann's exceptions where the request is not as it should be.
   ordered_json answer(const ordered_json& request) {
     if (!request.is_object() || request.size() != 1)
-      throw UserError("a request is a JSON object with one member: step, reset, send, set or failures");
+      throw UserError("a request is a JSON object with one member: step, reset, send, place, set or failures");
     const std::string& what = request.begin().key();
     const ordered_json& with = request.begin().value();
     if (what == "step") return step(with);
     if (what == "reset") return reset(with);
     if (what == "send") return send(with);
+    if (what == "place") return place(with);
     if (what == "set") return set(with);
     if (what == "failures") return failures();
-    throw UserError(fmt::format("there is no request {}; there are step, reset, send, set and failures", what));
+    throw UserError(
+        fmt::format("there is no request {}; there are step, reset, send, place, set and failures", what));
   }
 
  private:
@@ -99,13 +102,18 @@ class Requests {
     if (!data.is_array() || data.size() > kData) throw UserError("send: data has at most 9 octets");
     for (std::size_t i = 0; i < data.size(); ++i) packet.message.at(i) = octet_of(data[i]);
     packet.message.at(kData) = octet_of(message.at("type"));
-    std::vector<std::uint32_t> arenas(batch_.count());
-    std::iota(arenas.begin(), arenas.end(), 0);
-    if (message.contains("arenas")) {
-      arenas.clear();
-      for (const ordered_json& arena : message["arenas"]) arenas.push_back(arena_of(arena));
-    }
-    batch_.send(arenas, packet);
+    batch_.send(arenas_of(message), packet);
+    return ordered_json::object();
+  }
+
+  ordered_json place(const ordered_json& where) {
+    const bool movable = where.contains("movable");
+    const ordered_json& body = where.at(movable ? "movable" : "robot");
+    if (!body.is_number_unsigned() || body.get<std::uint64_t>() > std::numeric_limits<std::uint32_t>::max())
+      throw UserError(fmt::format("place: {} is no number of a robot or a movable body", body.dump()));
+    const Pose pose{where.at("x_mm").get<double>(), where.at("y_mm").get<double>(),
+                    where.value("heading_rad", 0.0)};
+    batch_.place(arenas_of(where), {movable, body.get<std::uint32_t>(), pose});
     return ordered_json::object();
   }
 
@@ -125,6 +133,17 @@ class Requests {
     return {{"failures", std::move(list)}};
   }
 
+  /// The arenas that a request names, else all.
+  std::vector<std::uint32_t> arenas_of(const ordered_json& request) const {
+    std::vector<std::uint32_t> arenas;
+    if (request.contains("arenas")) {
+      for (const ordered_json& arena : request.at("arenas")) arenas.push_back(arena_of(arena));
+      return arenas;
+    }
+    arenas.resize(batch_.count());
+    std::iota(arenas.begin(), arenas.end(), 0);
+    return arenas;
+  }
   std::uint32_t arena_of(const ordered_json& value) const {
     if (!value.is_number_unsigned() || value.get<std::uint64_t>() >= batch_.count())
       throw UserError(fmt::format("there is no arena {}; there are 0 to {}", value.dump(), batch_.count() - 1));

@@ -3,12 +3,14 @@
 
 #include <CLI/CLI.hpp>
 #include <memory>
-#include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "clients/cli/commands.hpp"
-#include "clients/cli/run_control.hpp"
+#include "clients/cli/control_requests.hpp"
 #include "core/base/error.hpp"
+#include "core/base/pose.hpp"
 #include "core/dds/dds.hpp"
 #include "core/os/interrupt.hpp"
 
@@ -18,38 +20,14 @@ namespace {
 struct ControlArguments {
   std::string command;
   std::uint32_t steps = 0, domain = 0;
+  std::optional<std::uint32_t> robot, movable;
+  std::vector<double> at_mm;
+  double heading_deg = 0;
   bool json = false;
   double patience_s = 10;
 };
 
 using Status = RunControl::Status;
-
-const char* name_of(kilotwin_open_RunPhase phase) {
-  switch (phase) {
-    case kilotwin_open_STARTING: return "starting";
-    case kilotwin_open_RUNNING: return "running";
-    case kilotwin_open_PAUSED: return "paused";
-    case kilotwin_open_ENDED: return "ended";
-    case kilotwin_open_BROKEN: return "broken";
-  }
-  return "unknown";
-}
-
-std::string in_json(const Status& status) {
-  const nlohmann::ordered_json json{{"run", fmt::format("{:016x}", status.run)},
-                                    {"name", status.name},
-                                    {"phase", name_of(status.phase)},
-                                    {"tick", status.tick},
-                                    {"last_tick", status.last_tick},
-                                    {"simulated_s", status.simulated_s},
-                                    {"wall_s", status.wall_s},
-                                    {"robots", status.robots},
-                                    {"robots_failed", status.robots_failed},
-                                    {"sent", status.sent},
-                                    {"received", status.received},
-                                    {"note", status.note}};
-  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
-}
 
 std::string in_words(const Status& status) {
   std::string text =
@@ -69,49 +47,41 @@ void require_steps(const ControlArguments& arguments) {
     throw UserError(fmt::format("control: {} takes no number; only step does", arguments.command));
 }
 
-/// Sends the command and waits for its effect.
-Status carry_out(RunControl& control, const ControlArguments& arguments, const Status& before) {
-  const std::chrono::duration<double> patience(arguments.patience_s);
-  const auto ask = [&](kilotwin_open_RunCommand command) { control.send(command, arguments.steps, patience); };
-  if (arguments.command == "pause") {
-    ask(kilotwin_open_PAUSE_RUN);
-    return control.await([](const Status& now) { return now.phase == kilotwin_open_PAUSED; }, "pause", patience);
-  }
-  if (arguments.command == "continue") {
-    ask(kilotwin_open_CONTINUE_RUN);
-    return control.await([](const Status& now) { return now.phase == kilotwin_open_RUNNING; }, "continue",
-                         patience);
-  }
-  if (arguments.command == "step") {
-    ask(kilotwin_open_STEP_RUN);
-    return control.await(
-        [&](const Status& now) {
-          return now.phase == kilotwin_open_PAUSED && now.tick >= before.tick + arguments.steps;
-        },
-        "take these steps", patience);
-  }
-  if (arguments.command == "stop") {
-    ask(kilotwin_open_STOP_RUN);
-    return control.await([](const Status& now) { return is_over(now.phase); }, "end", patience);
-  }
-  ask(kilotwin_open_CHECKPOINT_RUN);
-  return before;
+void require_place(const ControlArguments& arguments) {
+  const bool places = arguments.command == "place";
+  const bool whom = arguments.robot || arguments.movable;
+  if (places && (!whom || arguments.at_mm.empty()))
+    throw UserError(
+        "control: place needs a robot or a movable body, and a place; for example: "
+        "kilotwin control place --robot 3 --at 100 -50 --heading 90");
+  if (!places && (whom || !arguments.at_mm.empty()))
+    throw UserError(fmt::format("control: {} takes no place; only place does", arguments.command));
+}
+
+ControlRequest request_of(const ControlArguments& arguments) {
+  ControlRequest request{
+      arguments.command, arguments.steps, {}, std::chrono::duration<double>(arguments.patience_s)};
+  if (arguments.command == "place")
+    request.place = Relocation{arguments.movable.has_value(),
+                               arguments.movable ? *arguments.movable : *arguments.robot,
+                               {arguments.at_mm[0], arguments.at_mm[1], arguments.heading_deg * kPi / 180}};
+  return request;
 }
 
 int work(const ControlArguments& arguments) {
   require_steps(arguments);
+  require_place(arguments);
   catch_interrupts();
-  RunControl control(arguments.domain);
-  const std::chrono::duration<double> patience(arguments.patience_s);
-  Status status = control.find(patience);
-  if (arguments.command != "status") {
-    if (is_over(status.phase))
-      throw RunError(fmt::format("the run {} is over; there is nothing to {}", status.name, arguments.command));
-    status = carry_out(control, arguments, status);
-    if (is_over(status.phase) && arguments.command != "stop")
-      throw RunError(fmt::format("the run {} came to its end before it could {}", status.name, arguments.command));
+  if (arguments.command == "requests") {
+    serve_requests(arguments.domain, std::chrono::duration<double>(arguments.patience_s));
+    return kDone;
   }
-  fmt::print("{}", arguments.json ? in_json(status) : in_words(status));
+  RunControl control(arguments.domain);
+  const Status status = carry_out(control, request_of(arguments));
+  fmt::print("{}",
+             arguments.json
+                 ? in_json(status).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n"
+                 : in_words(status));
   return status.phase == kilotwin_open_BROKEN ? kFailed : kDone;
 }
 
@@ -119,12 +89,28 @@ int work(const ControlArguments& arguments) {
 
 Command add_control(CLI::App& program) {
   const auto arguments = std::make_shared<ControlArguments>();
-  CLI::App& app = *program.add_subcommand("control", "pause, step, continue, save or stop a run; say how it goes");
-  app.add_option("COMMAND", arguments->command, "pause, continue, step, stop, checkpoint or status")
+  CLI::App& app = *program.add_subcommand(
+      "control", "pause, step, continue, save or stop a run; move a robot; say how it goes");
+  app.add_option(
+         "COMMAND", arguments->command,
+         "pause, continue, step, stop, checkpoint, place or status; or requests, which come on standard input")
       ->required()
-      ->check(CLI::IsMember({"pause", "continue", "step", "stop", "checkpoint", "status"}).description(""))
+      ->check(CLI::IsMember({"pause", "continue", "step", "stop", "checkpoint", "place", "status", "requests"})
+                  .description(""))
       ->type_name("");
   app.add_option("STEPS", arguments->steps, "with step: the ticks after which the run pauses again")->type_name("");
+  const auto robot = app.add_option("--robot", arguments->robot, "with place: the robot")->type_name("N");
+  app.add_option("--movable", arguments->movable, "with place: the movable body, by its number from 0")
+      ->excludes(robot)
+      ->type_name("N");
+  app.add_option("--at", arguments->at_mm,
+                 "with place: where its centre comes to stand, mm from the arena's centre")
+      ->expected(2)
+      ->type_name("X Y");
+  app.add_option("--heading", arguments->heading_deg, "with place: degrees anticlockwise from the x axis")
+      ->check(CLI::Range(-360.0, 360.0).description(""))
+      ->capture_default_str()
+      ->type_name("DEG");
   app.add_option("--domain", arguments->domain, "DDS domain of the run, which `kilotwin run` prints")
       ->check(CLI::Range(0u, dds::kLastDomain).description(""))
       ->capture_default_str()

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <thread>
 
 #include "core/base/error.hpp"
@@ -18,6 +19,13 @@ using Seconds = std::chrono::duration<double>;
 
 constexpr auto kSayAfter = std::chrono::seconds(1);
 constexpr auto kPoll = std::chrono::milliseconds(20);
+
+/// A robot counts as placed where it is this near: it may have moved on before the state that is seen.
+constexpr double kNear_mm = 20;
+
+Clock::time_point deadline(Seconds patience) {
+  return Clock::now() + std::chrono::duration_cast<Clock::duration>(patience);
+}
 
 /// Requests count per client, so every process is a client of its own.
 std::string client_name() {
@@ -35,6 +43,7 @@ RunControl::RunControl(std::uint32_t domain)
       client_(client_name()),
       participant_({domain, {}}),
       control_(participant_, topics::run_control()),
+      relocations_(participant_, topics::relocations()),
       reader_(participant_, topics::run_status(),
               [this](const Status& sample, dds::SampleState state) { on_status(sample, state); }) {}
 
@@ -74,31 +83,71 @@ RunControl::Status RunControl::find(Seconds patience) {
   return *status_;
 }
 
-void RunControl::send(kilotwin_open_RunCommand command, std::uint32_t steps, Seconds patience) {
-  const auto until = Clock::now() + patience;
-  while (control_.readers() == 0) {
+template <class Sample>
+void RunControl::write(dds::Writer<Sample>& writer, Sample& sample, Clock::time_point until) {
+  while (writer.readers() == 0) {
     if (Clock::now() > until || interrupted() != 0)
       throw RunError(
           fmt::format("the run on domain {} takes no commands; its station has not been found", domain_));
     std::this_thread::sleep_for(kPoll);
   }
-  PublicRunControl sample{};
   client_.copy(sample.client, sizeof sample.client - 1);
   {
     const std::lock_guard lock(mutex_);
     sample.run = status_ ? status_->run : 0;
   }
   sample.request = ++requests_;
+  writer.write(sample);
+  if (!writer.flush(std::max(0.1, Seconds(until - Clock::now()).count())))
+    throw RunError(fmt::format("the station of the run on domain {} does not answer", domain_));
+}
+
+void RunControl::send(kilotwin_open_RunCommand command, std::uint32_t steps, Seconds patience) {
+  PublicRunControl sample{};
   sample.command = command;
   sample.steps = steps;
-  control_.write(sample);
-  if (!control_.flush(std::max(0.1, Seconds(until - Clock::now()).count())))
-    throw RunError(fmt::format("the station of the run on domain {} does not answer", domain_));
+  write(control_, sample, deadline(patience));
+}
+
+void RunControl::place(const Relocation& where, Seconds patience) {
+  const auto until = deadline(patience);
+  const auto& [movable, body, pose] = where;
+  std::mutex mutex;
+  std::condition_variable seen;
+  bool is_there = false;
+  const dds::Reader<PublicSwarmState> swarm(
+      participant_, topics::swarm(), [&](const PublicSwarmState& sample, dds::SampleState state) {
+        const auto& x = movable ? sample.movable_x_mm : sample.x_mm;
+        const auto& y = movable ? sample.movable_y_mm : sample.y_mm;
+        if (!state.valid || body >= x._length || body >= y._length) return;
+        const std::lock_guard lock(mutex);
+        is_there = is_there || std::hypot(x._buffer[body] - pose.x_mm, y._buffer[body] - pose.y_mm) < kNear_mm;
+        seen.notify_one();
+      });
+  PublicRelocation sample{};
+  sample.movable = movable;
+  sample.body = body;
+  sample.x_mm = pose.x_mm;
+  sample.y_mm = pose.y_mm;
+  sample.heading_rad = pose.heading_rad;
+  write(relocations_, sample, until);
+  const auto paused = [this] {
+    const std::lock_guard lock(mutex_);
+    return status_->phase == kilotwin_open_PAUSED;
+  };
+  std::unique_lock lock(mutex);
+  while (!is_there && !paused()) {
+    if (Clock::now() > until)
+      throw RunError(fmt::format("{} {} did not come to stand there within {:g} s; the station's log says why",
+                                 movable ? "movable body" : "robot", body, patience.count()));
+    if (interrupted() != 0) throw RunError("interrupted");
+    seen.wait_for(lock, kPoll);
+  }
 }
 
 RunControl::Status RunControl::await(const std::function<bool(const Status&)>& done, const std::string& what,
                                      Seconds patience) {
-  const auto until = Clock::now() + patience;
+  const auto until = deadline(patience);
   std::unique_lock lock(mutex_);
   while (!done(*status_) && !is_over(status_->phase) && !gone_) {
     if (Clock::now() > until) {

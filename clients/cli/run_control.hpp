@@ -10,6 +10,7 @@
 #include <string>
 
 #include "core/federation/topics.hpp"
+#include "core/frames/frames.hpp"
 
 namespace kilotwin::cli {
 
@@ -24,12 +25,18 @@ class RunControl {
   Status find(std::chrono::duration<double> patience);
   /// Sends a command to the run of find(), and waits until the station has it. Throws RunError after `patience`.
   void send(kilotwin_open_RunCommand command, std::uint32_t steps, std::chrono::duration<double> patience);
+  /// Places a robot or a movable body of the run of find() elsewhere, and waits until the run shows it there; where the run is
+  /// paused, until the station has the request. Throws RunError after `patience`.
+  void place(const Relocation& where, std::chrono::duration<double> patience);
   /// Waits until the run's status satisfies `done`, or the run is over, and returns the last status. Throws RunError after
   /// `patience`: "the run ... did not WHAT within ... s".
   Status await(const std::function<bool(const Status&)>& done, const std::string& what,
                std::chrono::duration<double> patience);
 
  private:
+  /// Sends a request of this client, and waits until the station has it.
+  template <class Sample>
+  void write(dds::Writer<Sample>& writer, Sample& sample, std::chrono::steady_clock::time_point until);
   void on_status(const Status& sample, dds::SampleState state);
 
   const std::uint32_t domain_;
@@ -41,6 +48,7 @@ class RunControl {
   bool several_ = false, gone_ = false;
   dds::Participant participant_;
   dds::Writer<PublicRunControl> control_;
+  dds::Writer<PublicRelocation> relocations_;
   dds::Reader<Status> reader_;
 };
 

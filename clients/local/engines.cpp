@@ -86,7 +86,7 @@ void Engines::step(std::uint32_t task, Tick from, const RunSchedule& schedule, c
   const auto partitions = static_cast<std::uint32_t>(physics_.size());
   if (task < partitions) {
     physics_[task]->step(from, {in.ghosts_for[task], in.all_actuation, plan_.any_tracked() ? &in.tracking : nullptr,
-                                schedule.memberships()});
+                                schedule.memberships(), schedule.relocations()});
   } else if (task == partitions) {
     radio_.step(from, {swarm_, in.overhead});
   } else if (task == partitions + 1) {

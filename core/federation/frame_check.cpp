@@ -163,6 +163,22 @@ const char* defect(const TrackingFrame& frame, const RunPlan& plan, FederateId, 
   return std::all_of(frame.led.begin(), frame.led.end(), colour) ? nullptr : "an LED has no such colour";
 }
 
+const char* defect(const Relocation& relocation, const RunPlan& plan) {
+  const auto& [movable, body, pose] = relocation;
+  if (!std::isfinite(pose.x_mm) || !std::isfinite(pose.y_mm) ||
+      !(pose.heading_rad >= -kPi && pose.heading_rad < kPi))
+    return "its pose is no pose";
+  if (body >= (movable ? plan.movables() : plan.robots())) return "its body does not exist";
+  if (!movable && plan.tracked(body)) return "its robot is a real one, which no simulation moves";
+  const Convex shape = movable ? plan.world.movables[body].shape : Convex::disc(kRobotRadius_mm);
+  const Place place = Place::at(pose.x_mm, pose.y_mm, pose.heading_rad);
+  if (plan.world.arena.clearance_mm(shape, place) < 0) return "its place is not within the arena";
+  for (const ObstacleBody& obstacle : plan.world.obstacles) {
+    if (separation_mm(shape, place, obstacle.shape, obstacle.place) < 0) return "its place overlaps an obstacle";
+  }
+  return nullptr;
+}
+
 const char* defect(const Directive& directive, const RunPlan& plan) {
   if (directive.tick < Tick{0}) return "its tick is negative";
   if (directive.tick > plan.last_tick + kAnnounceAhead) return "its tick lies after the run's end";
@@ -182,6 +198,7 @@ const char* defect(const Directive& directive, const RunPlan& plan) {
       if (robot >= plan.robots() || !plan.tracked(robot)) return "its robot is none that is tracked";
       return directive.membership.membership <= Membership::kLost ? nullptr : "its membership is unknown";
     }
+    case DirectiveKind::kRelocation: return defect(directive.relocation, plan);
   }
   return "its kind is unknown";
 }

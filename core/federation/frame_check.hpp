@@ -14,6 +14,8 @@ namespace kilotwin {
 [[nodiscard]] const char* defect(const RadioFrame&, const RunPlan&, FederateId publisher, FederateId reader);
 [[nodiscard]] const char* defect(const OverheadFrame&, const RunPlan&, FederateId publisher, FederateId reader);
 [[nodiscard]] const char* defect(const TrackingFrame&, const RunPlan&, FederateId publisher, FederateId reader);
+/// Why a relocation is impossible, or nullptr.
+[[nodiscard]] const char* defect(const Relocation&, const RunPlan&);
 /// The first defect of a directive, or nullptr.
 [[nodiscard]] const char* defect(const Directive&, const RunPlan&);
 

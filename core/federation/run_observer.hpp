@@ -115,6 +115,14 @@ struct TrackingTotals {
   std::uint64_t bodies_without_space = 0;  ///< how often a tracked robot came to stand on another body
 };
 
+/// Where the wall time of a federate went, from its first tick to its last.
+struct FederateTime {
+  std::string name;       ///< RunPlan::name()
+  double step_s = 0;      ///< in its engine
+  double exchange_s = 0;  ///< publishing its frames
+  double wait_s = 0;      ///< for other federates, and for the run's pace
+};
+
 /// Totals of a run.
 struct RunTotals {
   Tick first, last;  ///< last: the tick at which the run ended, possibly before the experiment's end
@@ -125,13 +133,14 @@ struct RunTotals {
   std::uint64_t attempted = 0, sent = 0, received = 0, collided = 0;
   std::uint32_t robots_failed = 0;
   std::array<std::uint64_t, static_cast<std::size_t>(Work::kCount)> work_ns{};
-  StationTotals station;           ///< empty without virtual environments
-  std::vector<PairCount> pairs;    ///< empty unless RecordingSettings::messages
-  std::vector<RadioCount> radios;  ///< per robot; empty if the run failed before the radio's report
-  bool stopped_early = false;      ///< a directive ended the run
-  LatenessTotals lateness;         ///< where the run was paced
-  TrackingTotals tracking;         ///< where robots are tracked
-  std::string failure;             ///< one line if the run failed, else empty
+  std::vector<FederateTime> federates;  ///< in the order of the plan; empty if all engines share a process
+  StationTotals station;                ///< empty without virtual environments
+  std::vector<PairCount> pairs;         ///< empty unless RecordingSettings::messages
+  std::vector<RadioCount> radios;       ///< per robot; empty if the run failed before the radio's report
+  bool stopped_early = false;           ///< a directive ended the run
+  LatenessTotals lateness;              ///< where the run was paced
+  TrackingTotals tracking;              ///< where robots are tracked
+  std::string failure;                  ///< one line if the run failed, else empty
 };
 
 }  // namespace kilotwin

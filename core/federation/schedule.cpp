@@ -22,6 +22,7 @@ void RunSchedule::apply_until(Tick now) {
     inputs_tick_ = now;
     overhead_inputs_.clear();
     memberships_.clear();
+    relocations_.clear();
     if (pause_again_ == now) {
       paused_ = true;
       pause_again_ = Tick{-1};
@@ -46,6 +47,7 @@ void RunSchedule::apply_until(Tick now) {
       case DirectiveKind::kCheckpoint: checkpoints_.push_back(directive.tick); break;
       case DirectiveKind::kOverheadInput: overhead_inputs_.push_back(directive.packet); break;
       case DirectiveKind::kMembership: memberships_.push_back(directive.membership); break;
+      case DirectiveKind::kRelocation: relocations_.push_back(directive.relocation); break;
     }
   }
 }

@@ -29,7 +29,8 @@ enum class DirectiveKind : std::uint8_t {
   kStop,
   kCheckpoint,
   kOverheadInput,
-  kMembership
+  kMembership,
+  kRelocation
 };
 
 struct Directive {
@@ -39,6 +40,7 @@ struct Directive {
   std::uint32_t steps = 0;      ///< with kStep: ticks until the next pause
   OverheadPacket packet;        ///< with kOverheadInput
   MembershipChange membership;  ///< with kMembership
+  Relocation relocation;        ///< with kRelocation
 };
 
 class RunSchedule {
@@ -63,6 +65,7 @@ class RunSchedule {
   // External inputs of the step from `now`; valid once the verdict at `now` is kStep.
   [[nodiscard]] const std::vector<OverheadPacket>& overhead_inputs() const { return overhead_inputs_; }
   [[nodiscard]] const std::vector<MembershipChange>& memberships() const { return memberships_; }
+  [[nodiscard]] const std::vector<Relocation>& relocations() const { return relocations_; }
 
   /// Whether the state at `now` is to be saved; valid once the verdict at `now` is kStep or kFinished.
   [[nodiscard]] bool checkpoint_at(Tick now) const;
@@ -82,9 +85,10 @@ class RunSchedule {
   bool paused_ = false;
   bool stopped_ = false;
   Tick pause_again_{-1};  // after a kStep; negative: never
-  Tick inputs_tick_{-1};  // of the two lists below
+  Tick inputs_tick_{-1};  // of the three lists below
   std::vector<OverheadPacket> overhead_inputs_;
   std::vector<MembershipChange> memberships_;
+  std::vector<Relocation> relocations_;
   std::vector<Tick> checkpoints_;  // by directives
 };
 

@@ -18,6 +18,7 @@ using WireMember = kilotwin_wire_Member;
 using WireDirective = kilotwin_wire_Directive;
 using WireMetrics = kilotwin_wire_Metrics;
 using PublicRunControl = kilotwin_open_RunControl;
+using PublicRelocation = kilotwin_open_Relocation;
 using PublicOverheadPacket = kilotwin_open_OverheadPacket;
 using PublicStationPacket = kilotwin_open_StationPacket;
 using PublicTrackerFrame = kilotwin_open_TrackerFrame;
@@ -50,6 +51,7 @@ inline Channel directives() { return {"kilotwin/directives", Delivery::kLog, ""}
 inline Channel metrics() { return {"kilotwin/metrics", Delivery::kMetrics, ""}; }
 
 inline Channel run_control() { return {"kilotwin/run_control", Delivery::kRequest, ""}; }
+inline Channel relocations() { return {"kilotwin/relocations", Delivery::kRequest, ""}; }
 inline Channel overhead_packets() { return {"kilotwin/overhead_packets", Delivery::kRequest, ""}; }
 inline Channel station_packets() { return {"kilotwin/station_packets", Delivery::kRequest, ""}; }
 inline Channel tracker_frames() { return {"kilotwin/tracker_frames", Delivery::kSensor, ""}; }
@@ -86,6 +88,9 @@ template <> inline const dds_topic_descriptor_t* descriptor<WireDirective>() {
 template <> inline const dds_topic_descriptor_t* descriptor<WireMetrics>() { return &kilotwin_wire_Metrics_desc; }
 template <> inline const dds_topic_descriptor_t* descriptor<PublicRunControl>() {
   return &kilotwin_open_RunControl_desc;
+}
+template <> inline const dds_topic_descriptor_t* descriptor<PublicRelocation>() {
+  return &kilotwin_open_Relocation_desc;
 }
 template <> inline const dds_topic_descriptor_t* descriptor<PublicOverheadPacket>() {
   return &kilotwin_open_OverheadPacket_desc;

@@ -224,8 +224,18 @@ WireDirective to_wire(std::uint64_t run, const Directive& directive) {
   if (directive.kind == DirectiveKind::kOverheadInput) {
     wire.packet = borrow<decltype(wire.packet)>(&directive.packet, 1);
   }
-  wire.robot = directive.membership.robot;
-  wire.membership = static_cast<std::uint8_t>(directive.membership.membership);
+  if (directive.kind == DirectiveKind::kMembership) {
+    wire.robot = directive.membership.robot;
+    wire.membership = static_cast<std::uint8_t>(directive.membership.membership);
+  }
+  if (directive.kind == DirectiveKind::kRelocation) {
+    const auto& [movable, body, pose] = directive.relocation;
+    wire.robot = body;
+    wire.movable = movable;
+    wire.x_mm = pose.x_mm;
+    wire.y_mm = pose.y_mm;
+    wire.heading_rad = pose.heading_rad;
+  }
   return wire;
 }
 
@@ -235,6 +245,7 @@ bool from_wire(const WireDirective& wire, Directive& directive) {
   directive.kind = static_cast<DirectiveKind>(wire.kind);
   directive.steps = wire.steps;
   directive.membership = {wire.robot, static_cast<Membership>(wire.membership)};
+  directive.relocation = {wire.movable, wire.robot, {wire.x_mm, wire.y_mm, wire.heading_rad}};
   if (directive.kind != DirectiveKind::kOverheadInput) return true;
   if (wire.packet._length != sizeof(OverheadPacket)) return false;
   std::memcpy(static_cast<void*>(&directive.packet), wire.packet._buffer, sizeof(OverheadPacket));

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/pose.hpp"
 #include "core/base/time.hpp"
 #include "core/frames/overhead_packet.hpp"
 
@@ -151,6 +152,14 @@ enum class Membership : std::uint8_t {
 struct MembershipChange {
   std::uint32_t robot = 0;
   Membership membership = Membership::kJoined;
+};
+
+/// A simulated robot or a movable body is placed elsewhere, as by hand: its pose after a step. The step's motion of the body
+/// is lost, it stands still, and the effects' memory of the robot begins anew.
+struct Relocation {
+  bool movable = false;  ///< whether `body` is the number of a movable body, else that of a robot
+  std::uint32_t body = 0;
+  Pose pose;
 };
 
 }  // namespace kilotwin

@@ -1,8 +1,10 @@
-/// VariableSampler: reads recorded variables out of robots' memories at the ticks at which they are due. Nothing that it does
-/// affects a result.
+/// VariableSampler: reads recorded variables out of robots' memories, and the voltages of their batteries, at the ticks at which
+/// they are due. Nothing that it does affects a result.
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <string_view>
 #include <vector>
 
 #include "core/base/recording_schedule.hpp"
@@ -15,14 +17,19 @@ namespace proto {
 class Observations;
 }
 
+/// The recorded variable of this name is no variable of a program. It is the voltage of the robot's battery, V, under the load of
+/// the last tick: the mean of what the program would read.
+inline constexpr std::string_view kBatteryVariable = "battery_V";
+
 class VariableSampler {
  public:
   /// For the robots of a share that run firmware, or for those that do not.
   VariableSampler(const RunPlan& plan, Share share, bool firmware);
 
   [[nodiscard]] bool any() const { return !variables_.empty(); }
-  /// Adds the variables that are due at `now`.
-  void sample(Tick now, const ProgramMemory& memory, proto::Observations& to) const;
+  /// Adds the variables that are due at `now`. `battery_V` gives a robot's voltage; it is called only if the run has batteries.
+  void sample(Tick now, const ProgramMemory& memory, const std::function<double(std::uint32_t robot)>& battery_V,
+              proto::Observations& to) const;
 
  private:
   struct Reading {
@@ -33,7 +40,8 @@ class VariableSampler {
     bool integer = false;
     RecordingSchedule schedule;
     std::vector<VariablePlace> places;
-    std::vector<Reading> readings;  ///< ascending robots
+    std::vector<Reading> readings;         ///< ascending robots
+    std::vector<std::uint32_t> batteries;  ///< robots whose battery is the variable, ascending
   };
 
   std::vector<Variable> variables_;

@@ -73,10 +73,14 @@ std::int64_t Battery::supply(double x_mm, double y_mm) const {
   return most;
 }
 
-double Battery::reading(std::int64_t charge, std::int64_t drain) const {
+double Battery::volts(std::int64_t charge, std::int64_t drain) const {
   const double amperes = static_cast<double>(drain) / static_cast<double>(tick_cycles_) * 1e-6;
   const double part = static_cast<double>(charge) / static_cast<double>(capacity_);
-  return voltage_reading(open_circuit_volts(part) - ohm_ * amperes);
+  return open_circuit_volts(part) - ohm_ * amperes;
+}
+
+double Battery::reading(std::int64_t charge, std::int64_t drain) const {
+  return voltage_reading(volts(charge, drain));
 }
 
 }  // namespace kilotwin::senses

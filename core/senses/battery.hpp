@@ -44,6 +44,8 @@ class Battery {
 
   /// Mean reading of the voltage, counts, under a load of `drain` per tick.
   [[nodiscard]] double reading(std::int64_t charge, std::int64_t drain) const;
+  /// The same as a voltage, V.
+  [[nodiscard]] double volts(std::int64_t charge, std::int64_t drain) const;
   /// Standard deviation of one reading, counts.
   [[nodiscard]] double sd() const { return sd_; }
   /// Charge at which a robot with a flat battery starts again.

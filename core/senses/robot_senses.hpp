@@ -50,6 +50,8 @@ class RobotSenses {
   [[nodiscard]] bool has_batteries() const { return battery_.has_value(); }
   /// Charge of the battery, uA cycles (see Battery).
   [[nodiscard]] std::int64_t charge(std::uint32_t i) const { return charge_[i]; }
+  /// Voltage of the battery under the load of the last tick, V. Requires has_batteries().
+  [[nodiscard]] double battery_V(std::uint32_t i) const { return battery_->volts(charge_[i], drain_[i]); }
   /// Advances the charge by one tick with this load and the charger, if the robot stands on one.
   void spend(std::uint32_t i, const Battery::Use& use) { settle(i, battery_->drain(use)); }
   /// Advances the charge of a robot that is off by one tick.

@@ -1,6 +1,13 @@
 #include "services/ark/external_input.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
+
+#include "core/base/pose.hpp"
+#include "core/base/say.hpp"
+#include "core/federation/frame_check.hpp"
 
 namespace kilotwin::ark {
 
@@ -13,7 +20,11 @@ ExternalInput::ExternalInput(const RunPlan& plan, const dds::Participant& partic
       overhead_packets_(participant, topics::overhead_packets(),
                         [this](const PublicOverheadPacket& sample, dds::SampleState state) {
                           if (state.valid) on_overhead_packet(sample);
-                        }) {}
+                        }),
+      relocations_(participant, topics::relocations(),
+                   [this](const PublicRelocation& sample, dds::SampleState state) {
+                     if (state.valid) on_relocation(sample);
+                   }) {}
 
 std::vector<Directive> ExternalInput::take() {
   const std::lock_guard lock(mutex_);
@@ -54,6 +65,21 @@ void ExternalInput::on_overhead_packet(const PublicOverheadPacket& sample) {
   if (!is_known(directive.packet.command)) return;
   std::copy_n(sample.message, directive.packet.message.size(), directive.packet.message.begin());
   std::copy_n(sample.rest, directive.packet.rest.size(), directive.packet.rest.begin());
+  waiting_.push_back(directive);
+}
+
+void ExternalInput::on_relocation(const PublicRelocation& sample) {
+  const std::lock_guard lock(mutex_);
+  if (!ours(sample.run) || !is_new(std::string("relocation ") + sample.client, sample.request)) return;
+  Directive directive;
+  directive.kind = DirectiveKind::kRelocation;
+  const double heading = wrapped(std::remainder(sample.heading_rad, 2 * kPi));
+  directive.relocation = {sample.movable, sample.body, {sample.x_mm, sample.y_mm, heading}};
+  if (const char* const why = defect(directive.relocation, plan_)) {
+    say(fmt::format("the request of {} to place {} {} elsewhere is ignored: {}", sample.client,
+                    sample.movable ? "movable body" : "robot", sample.body, why));
+    return;
+  }
   waiting_.push_back(directive);
 }
 

@@ -22,6 +22,7 @@ class ExternalInput {
  private:
   void on_run_control(const PublicRunControl&);
   void on_overhead_packet(const PublicOverheadPacket&);
+  void on_relocation(const PublicRelocation&);
   [[nodiscard]] bool ours(std::uint64_t run) const { return run == 0 || run == plan_.run(); }
   /// False where the client's request was seen before; with the mutex held.
   bool is_new(const std::string& client, std::uint32_t request);
@@ -32,6 +33,7 @@ class ExternalInput {
   std::map<std::string, std::uint32_t> last_request_;  // per topic and client
   dds::Reader<PublicRunControl> run_control_;
   dds::Reader<PublicOverheadPacket> overhead_packets_;
+  dds::Reader<PublicRelocation> relocations_;
 };
 
 }  // namespace kilotwin::ark

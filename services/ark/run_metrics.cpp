@@ -50,6 +50,7 @@ void RunMetrics::on_metrics(const WireMetrics& metrics) {
   account.last = metrics.last;
   account.step_ns = metrics.step_ns;
   account.exchange_ns = metrics.exchange_ns;
+  account.wait_ns = metrics.wait_ns;
   account.cpu_ns = metrics.cpu_ns;
   account.peak_memory_kib = metrics.peak_memory_kib;
   account.robots_failed = metrics.robots_failed;
@@ -118,6 +119,7 @@ void RunMetrics::fill(RunTotals& totals) {
   totals.robots_failed = 0;
   totals.tracking.bodies_without_space = 0;
   totals.work_ns = {};
+  totals.federates.clear();
   totals.pairs.clear();
   totals.radios.clear();
   for (std::uint32_t i = 0; i < accounts_.size(); ++i) {
@@ -132,6 +134,9 @@ void RunMetrics::fill(RunTotals& totals) {
     totals.tracking.bodies_without_space += account.bodies_without_space;
     totals.work_ns[static_cast<std::size_t>(work_of(i))] += account.step_ns;
     totals.work_ns[static_cast<std::size_t>(Work::kExchange)] += account.exchange_ns;
+    totals.federates.push_back({plan_.name(FederateId{i}), static_cast<double>(account.step_ns) * 1e-9,
+                                static_cast<double>(account.exchange_ns) * 1e-9,
+                                static_cast<double>(account.wait_ns) * 1e-9});
     totals.pairs.insert(totals.pairs.end(), account.pairs.begin(), account.pairs.end());
     totals.radios.insert(totals.radios.end(), account.radios.begin(), account.radios.end());
   }

@@ -35,7 +35,7 @@ class RunMetrics {
   struct Account {
     Tick next;  ///< of the hash parts that come next
     bool heard = false, last = false;
-    std::uint64_t step_ns = 0, exchange_ns = 0, cpu_ns = 0;
+    std::uint64_t step_ns = 0, exchange_ns = 0, wait_ns = 0, cpu_ns = 0;
     std::uint32_t peak_memory_kib = 0, robots_failed = 0, bodies_without_space = 0;
     std::uint64_t attempted = 0, sent = 0, received = 0, collided = 0;
     std::vector<PairCount> pairs{};

@@ -110,7 +110,13 @@ class StationFederate : public Federate {
     settle();
     const RunProgress progress = this->progress();
     observer_.idle(progress);
-    if (progress.paused) swarm_stream_.repeat(swarm_);
+    if (progress.paused) {
+      // All frames of this tick are there; only the step that takes them waits.
+      const Tick now = session_.now();
+      swarm_.gather(now, bodies_.at(now));
+      swarm_.gather(actuation_.at(now));
+      swarm_stream_.repeat(swarm_);
+    }
     publish_status(!session_.started() ? kilotwin_open_STARTING
                    : progress.paused   ? kilotwin_open_PAUSED
                                        : kilotwin_open_RUNNING,

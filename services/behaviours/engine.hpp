@@ -115,6 +115,9 @@ class BehavioursEngine {
   /// The offset to which a pointer in a robot's memory points.
   [[nodiscard]] std::uint64_t offset_of(std::uint32_t robot, std::uint64_t pointer) const;
 
+  /// Voltage of the battery of robot `id` of this host, V. Requires that the experiment has batteries.
+  [[nodiscard]] double battery_V(std::uint32_t id) const { return senses_.battery_V(id - share_.first); }
+
   /// Octets that the memories of all robots occupy.
   [[nodiscard]] std::uint64_t memory_octets() const;
 

@@ -9,7 +9,10 @@ HostObserver::HostObserver(const RunPlan& plan, HostId host, const BehavioursEng
     : engine_(engine), sampler_(plan, plan.share(host), false), failures_(engine.failures().size()) {}
 
 void HostObserver::at(Tick now, proto::Observations& to) const {
-  if (sampler_.any()) sampler_.sample(now, HostMemory(engine_), to);
+  if (sampler_.any()) {
+    sampler_.sample(
+        now, HostMemory(engine_), [this](std::uint32_t robot) { return engine_.battery_V(robot); }, to);
+  }
 }
 
 void HostObserver::stepped(Tick from, proto::Observations& to) {

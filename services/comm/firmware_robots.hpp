@@ -57,6 +57,8 @@ class FirmwareRobots {
   [[nodiscard]] virtual bool read(std::uint32_t i, std::uint16_t address, std::span<std::uint8_t> to) const {
     return static_cast<void>(i), static_cast<void>(address), static_cast<void>(to), false;
   }
+  /// Voltage of robot i's battery, V. Called only if the experiment has batteries.
+  [[nodiscard]] virtual double battery_V(std::uint32_t i) const { return static_cast<void>(i), 0; }
   /// Digest of the robot's state, for the state hash.
   [[nodiscard]] virtual std::uint64_t word(std::uint32_t i) const = 0;
   [[nodiscard]] virtual std::string save(std::uint32_t i) const = 0;

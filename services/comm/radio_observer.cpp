@@ -10,15 +10,18 @@ namespace {
 /// Where avr-gcc's debug information puts RAM.
 constexpr std::uint64_t kRamInDebugInformation = 0x800000, kRamEnd = 0x900;
 
+std::uint32_t index_of(std::uint32_t robot, const FirmwareRobots& robots) {
+  const auto ids = robots.ids();
+  return static_cast<std::uint32_t>(std::lower_bound(ids.begin(), ids.end(), robot) - ids.begin());
+}
+
 class FirmwareMemory final : public ProgramMemory {
  public:
   explicit FirmwareMemory(const FirmwareRobots& robots) : robots_(robots) {}
   [[nodiscard]] bool read(std::uint32_t robot, std::uint64_t address, std::span<std::uint8_t> to) const override {
     const std::uint64_t at = address - kRamInDebugInformation;
     if (address < kRamInDebugInformation || at + to.size() > kRamEnd) return false;
-    const auto ids = robots_.ids();
-    const auto found = std::lower_bound(ids.begin(), ids.end(), robot);
-    return robots_.read(static_cast<std::uint32_t>(found - ids.begin()), static_cast<std::uint16_t>(at), to);
+    return robots_.read(index_of(robot, robots_), static_cast<std::uint16_t>(at), to);
   }
   [[nodiscard]] std::uint64_t address_of(std::uint32_t, std::uint64_t pointer) const override {
     return kRamInDebugInformation + pointer;
@@ -36,8 +39,11 @@ RadioObserver::RadioObserver(const RunPlan& plan, RadioEngine& engine)
 }
 
 void RadioObserver::at(Tick now, proto::Observations& to) const {
-  if (sampler_.any() && engine_.firmware() != nullptr)
-    sampler_.sample(now, FirmwareMemory(*engine_.firmware()), to);
+  if (!sampler_.any() || engine_.firmware() == nullptr) return;
+  const FirmwareRobots& robots = *engine_.firmware();
+  sampler_.sample(
+      now, FirmwareMemory(robots), [&](std::uint32_t robot) { return robots.battery_V(index_of(robot, robots)); },
+      to);
 }
 
 void RadioObserver::stepped(Tick from, proto::Observations& to) const {

@@ -39,6 +39,23 @@ void Bodies::resize(std::size_t size) {
   memory.resize(size * remembered);
 }
 
+void Bodies::insert(std::size_t at) {
+  const auto there = static_cast<std::ptrdiff_t>(at);
+  robot.insert(robot.begin() + there, 0);
+  for (auto* const column : {&x_mm, &y_mm, &heading_rad}) column->insert(column->begin() + there, 0);
+  for (auto* const column : {&tracked, &awake}) column->insert(column->begin() + there, 0);
+  memory.insert(memory.begin() + static_cast<std::ptrdiff_t>(at * remembered), remembered, 0);
+}
+
+void Bodies::erase(std::size_t at) {
+  const auto there = static_cast<std::ptrdiff_t>(at);
+  robot.erase(robot.begin() + there);
+  for (auto* const column : {&x_mm, &y_mm, &heading_rad}) column->erase(column->begin() + there);
+  for (auto* const column : {&tracked, &awake}) column->erase(column->begin() + there);
+  const auto first = memory.begin() + static_cast<std::ptrdiff_t>(at * remembered);
+  memory.erase(first, first + static_cast<std::ptrdiff_t>(remembered));
+}
+
 void Bodies::set(std::size_t to, const Bodies& other, std::size_t i) {
   robot[to] = other.robot[i];
   x_mm[to] = other.x_mm[i];

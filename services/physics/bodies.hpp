@@ -24,6 +24,9 @@ struct Bodies {
   void add(std::uint32_t id, double x, double y, double heading, std::uint8_t is_tracked, std::uint8_t is_awake);
   void add(const Bodies& other, std::size_t i);
   void resize(std::size_t);
+  /// Makes room for a body before entry `at`.
+  void insert(std::size_t at);
+  void erase(std::size_t at);
   /// Overwrites entry `to`.
   void set(std::size_t to, const Bodies& other, std::size_t i);
   void swap(Bodies& other) noexcept;

@@ -24,6 +24,7 @@ struct Inputs {
   std::span<const ActuationFrame* const> actuation;  ///< in any order; a robot in no frame is at rest
   const TrackingFrame* tracking = nullptr;           ///< where RunPlan::any_tracked(); alike for all partitions
   std::span<const MembershipChange> memberships{};   ///< that take effect in this step, in order
+  std::span<const Relocation> relocations{};         ///< that take effect after this step, in order
 };
 
 /// Ownership: in the step from tick k, the partition whose rectangle contains a robot's pose at k owns the robot. It

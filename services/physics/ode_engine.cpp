@@ -185,6 +185,13 @@ void OdeEngine::move(Tick from, const Inputs& inputs) {
   }
 }
 
+void OdeEngine::relocated(const Relocation& relocation) {
+  const auto& [movable, body, pose] = relocation;
+  RigidState& state = movable ? movable_states_[body] : states_[body];
+  state = upright(pose.x_mm, pose.y_mm, pose.heading_rad, movable ? movable_[body].height_mm : kRobotHeight_mm);
+  if (movable) list_movables();
+}
+
 void OdeEngine::read_ghosts(const Inputs& inputs) {
   for (const BodyFrame* frame : inputs.ghosts) {
     const std::vector<std::uint32_t>& movables = frame->movable.body;

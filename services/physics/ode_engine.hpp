@@ -69,6 +69,7 @@ class OdeEngine final : public PopulationEngine {
   OdeEngine(const RunPlan&, PartitionId, const DriveModel&);
 
   void move(Tick from, const Inputs&) override;
+  void relocated(const Relocation&) override;
   void read_ghosts(const Inputs&);
   void place_bodies();
   void fill_drives(Tick from);

@@ -43,7 +43,7 @@ class PhysicsFederate : public Federate {
 
   void step(Tick from) override {
     engine_->step(from, {ghosts_.at(from), actuation_.at(from), tracking_ ? tracking_->at(from)[0] : nullptr,
-                         session_.schedule().memberships()});
+                         session_.schedule().memberships(), session_.schedule().relocations()});
   }
 
   [[nodiscard]] std::uint64_t hash_part() const override { return engine_->hash_part(); }

@@ -68,6 +68,16 @@ void PlanarEngine::move(Tick from, const Inputs& inputs) {
   contact_.move(known, drives_);
 }
 
+void PlanarEngine::relocated(const Relocation& relocation) {
+  const auto& [movable, body, pose] = relocation;
+  if (movable) {
+    contact_.movables()[body] = {pose.x_mm, pose.y_mm, pose.heading_rad};
+    list_movables();
+  } else {
+    contact_.cache().clear(body);
+  }
+}
+
 void PlanarEngine::fill_drives(Tick from) {
   const Bodies& known = population_.known();
   drives_.count = 0;

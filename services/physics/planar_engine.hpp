@@ -27,6 +27,7 @@ class PlanarEngine final : public PopulationEngine {
  private:
   PlanarEngine(const RunPlan&, PartitionId, const DriveModel&);
   void move(Tick from, const Inputs&) override;
+  void relocated(const Relocation&) override;
   void read_ghosts(const Inputs&);
   void fill_drives(Tick from);
   void list_movables();

@@ -125,6 +125,27 @@ void Population::count_without_space() {
   }
 }
 
+void Population::relocate(std::span<const Relocation> relocations) {
+  for (const auto& [movable, robot, pose] : relocations) {
+    if (movable) continue;
+    const auto first = std::lower_bound(listed_.robot.begin(), listed_.robot.end(), robot);
+    auto at = static_cast<std::size_t>(first - listed_.robot.begin());
+    const bool was_here = first != listed_.robot.end() && *first == robot;
+    if (is_own(pose.x_mm, pose.y_mm)) {
+      if (!was_here) listed_.insert(at);
+      listed_.robot[at] = robot;
+      listed_.x_mm[at] = pose.x_mm;
+      listed_.y_mm[at] = pose.y_mm;
+      listed_.heading_rad[at] = pose.heading_rad;
+      listed_.tracked[at] = 0;
+      listed_.awake[at] = 1;
+      memory_.start(robot, listed_.memory_of(at));
+    } else if (was_here) {
+      listed_.erase(at);
+    }
+  }
+}
+
 /// Absent robots have their place in the list, among the others.
 void Population::list_absent() {
   Bodies all;

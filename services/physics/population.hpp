@@ -36,6 +36,8 @@ class Population {
   void begin(Tick from, const Inputs&);
   /// Advances the current tick by one.
   void end();
+  /// Lists robots that were placed elsewhere where they are now; after end().
+  void relocate(std::span<const Relocation>);
 
   // Valid between begin() and end(); ascending ids.
   [[nodiscard]] Bodies& known() { return known_; }
@@ -112,6 +114,9 @@ class PopulationEngine : public Engine {
     population_.begin(from, inputs);
     move(from, inputs);
     population_.end();
+    if (inputs.relocations.empty()) return;
+    population_.relocate(inputs.relocations);
+    for (const Relocation& relocation : inputs.relocations) relocated(relocation);
   }
   void emit_bodies(BodyFrame& frame) const override { population_.emit_bodies(frame); }
   void emit_ghosts(PartitionId neighbour, BodyFrame& frame) const override {
@@ -131,6 +136,9 @@ class PopulationEngine : public Engine {
       : population_(plan, partition, std::move(drive), reach_mm) {}
   /// Moves own bodies from tick `from` to the next. It may leave other bodies' poses unchanged.
   virtual void move(Tick from, const Inputs&) = 0;
+  /// Sets what the engine knows of a body that was placed elsewhere, besides its pose in the population: it stands still and
+  /// touches nothing. Called for all bodies, whichever partition has them.
+  virtual void relocated(const Relocation&) {}
 
   Population population_;
 };

@@ -1,6 +1,8 @@
 """The package against the program: PROGRAM SOURCES are the arguments."""
 
 import os
+import socket
+import subprocess
 import sys
 import tempfile
 import unittest
@@ -45,6 +47,18 @@ duration_s: 6 seed: 4
 arena { width_mm: 500 height_mm: 500 }
 robots { count: 5 behaviour: "obeys.c" layout { grid { pitch_mm: 60 } } }
 """
+
+
+def free_domain():
+    """A DDS domain that nobody uses: its first discovery port is free."""
+    for domain in range(60, 100):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(("127.0.0.1", 7400 + 250 * domain + 10))
+                return domain
+            except OSError:
+                continue
+    raise AssertionError("no domain is free")
 
 
 class Package(unittest.TestCase):
@@ -175,6 +189,91 @@ class Package(unittest.TestCase):
             self.assertTrue(np.isnan(arena.variable("gain")[2]))
             with self.assertRaisesRegex(kilotwin.KilotwinError, "robot 2 has no variable"):
                 arena.set_variable("gain", 1)
+
+    def test_an_arena_and_a_run_that_are_told_the_same_have_the_same_hash(self):
+        domain = free_domain()
+        options = ["--robots", "12", "--duration", "600", "--seed", "3"]
+        words = ["run", str(EXPERIMENT), *options, "--pace", "1", "--partitions", "2x1", "--quiet", "--domain", str(domain)]
+        run = subprocess.Popen([PROGRAM, *words, "--out", str(self.out / "run")])
+        try:
+            with kilotwin.join(domain, patience_s=30) as live:
+                self.assertEqual(live.robots, 12)
+                paused_at = live.pause()["tick"]
+                live.place(3, x_mm=-400, y_mm=390, heading_rad=7.0)
+                with self.assertRaisesRegex(kilotwin.KilotwinError, "no whole number"):
+                    live.place(-1, 0, 0)
+                ended_at = live.step(60)["tick"]
+                self.assertEqual(ended_at, paused_at + 60)
+                self.assertEqual(live.state()["x_mm"].shape, (12,))
+                self.assertEqual(live.stop()["phase"], "ended")
+            self.assertEqual(run.wait(30), 0)
+        finally:
+            run.kill()
+            run.wait()
+        summary = kilotwin.load(self.out / "run").summary
+        with kilotwin.Arena(EXPERIMENT, robots=12, duration_s=600, seed=3) as arena:
+            arena.step(paused_at)
+            arena.place(3, x_mm=-400, y_mm=390, heading_rad=7.0)
+            arena.step(1)
+            self.assertAlmostEqual(arena.x_mm[3], -400, delta=1)
+            arena.step(summary["ticks"] - paused_at - 1)
+            self.assertEqual(f"{int(arena.state_hash):016x}", summary["state_hash"])
+            with self.assertRaisesRegex(kilotwin.KilotwinError, "not within the arena"):
+                arena.place(3, 1e6, 0)
+        with kilotwin.Arena(EXPERIMENT, robots=12, duration_s=600, seed=3) as undisturbed:
+            undisturbed.step(summary["ticks"])
+            self.assertNotEqual(f"{int(undisturbed.state_hash):016x}", summary["state_hash"])
+        with self.assertRaisesRegex(kilotwin.KilotwinError, "no run on domain"):
+            kilotwin.join(domain, patience_s=0.5)
+
+    def test_batteries_are_recorded_as_voltages(self):
+        # 3.6 mA of 0.1 mAh: 1 % of the charge each second. From 0.4 to 0.2, the open-circuit voltage falls from 3.78 to 3.70 V.
+        (self.out / "obeys.c").write_text(OBEYS.replace("*(volatile int*)8 = 1", ""))
+        text = """
+            duration_s: 21 arena { width_mm: 600 height_mm: 600 }
+            battery { capacity_mAh: 0.1 charge: 0.4 charge_sd: 0 idle_mA: 3.6 resistance_ohm: 10 }
+            robots { count: 2 behaviour: "obeys.c" layout { grid { pitch_mm: 50 } } }
+            recording { every_s: 1 variable { name: "battery_V" every_s: 1 } }
+            observable { name: "volts" value: "mean(battery_V)" }
+            """
+        (self.out / "e.txtpb").write_text(text)
+        local = kilotwin.run(self.out / "e.txtpb", out=self.out / "local")
+        volts = local.variables()
+        self.assertEqual(volts.units["battery_V"], "V")
+        driven = (volts["time_s"] > 0) & (volts["time_s"] < 20)
+        expected = 3.70 + 0.08 * (0.2 - 0.01 * volts["time_s"]) / 0.2 - 10 * 0.0036
+        np.testing.assert_allclose(volts["battery_V"][driven], expected[driven], atol=2e-3)
+        self.assertAlmostEqual(local.summary["observables"]["volts"], volts["battery_V"][-1], places=6)
+        federated = kilotwin.run(self.out / "e.txtpb", mode="federated", out=self.out / "federated")
+        np.testing.assert_array_equal(federated.variables()["battery_V"], volts["battery_V"])
+        (self.out / "wrong.txtpb").write_text(text.replace('"battery_V" every', '"battery" every'))
+        with self.assertRaisesRegex(kilotwin.KilotwinError, "is battery_V"):
+            kilotwin.run(self.out / "wrong.txtpb", out=self.out / "wrong")
+
+    def test_trajectories_say_who_has_failed(self):
+        (self.out / "obeys.c").write_text(OBEYS.replace("seen_at_setup = gain", "if (kilo_uid == 2) *(volatile int*)8 = 1"))
+        (self.out / "e.txtpb").write_text(OBEYING)
+        table = kilotwin.run(self.out / "e.txtpb", out=self.out / "run").trajectories()
+        late = table["time_s"] > 2
+        np.testing.assert_array_equal(table["failed"][late], table["robot"][late] == 2)
+
+    def test_sweeps_are_coloured_by_a_field_or_by_group(self):
+        words = ["sweep", str(EXPERIMENT), "--duration", "2", "--set", "robots.count=log:2..18:3", "--set", "motion.noise=true,false"]
+        for colour, names in [("motion.noise", ["true", "false"]), ("group", ["MSD"])]:
+            out = self.out / colour
+            subprocess.run([PROGRAM, *words, "--colour-by", colour, "--out", str(out)], check=True, capture_output=True)
+            if not (out / "response.svg").exists():
+                self.skipTest("gnuplot is not installed")
+            for plot in ["sweep.svg", "response.svg"]:
+                text = (out / plot).read_text()
+                for name in names:
+                    self.assertIn(name, text)
+            # The numbers of a logarithmic axis over 2 to 18 are 10; those of a linear one are 5, 10, 15.
+            self.assertNotIn(">15<", (out / "response.svg").read_text().replace(" ", ""))
+        refused = subprocess.run([PROGRAM, *words, "--colour-by", "nothing", "--out", str(self.out / "no")], capture_output=True, text=True)
+        self.assertEqual(refused.returncode, 2)
+        self.assertIn("is not swept", refused.stderr)
+        self.assertFalse((self.out / "no").exists())
 
     def test_errors_of_arenas_are_exceptions(self):
         with self.assertRaisesRegex(kilotwin.KilotwinError, "none.txtpb") as raised:

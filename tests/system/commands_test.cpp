@@ -66,7 +66,7 @@ TEST_F(Commands, ExportWritesTrajectoriesAndMessages) {
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   const std::string trajectories = read(scratch / "t.csv");
   EXPECT_EQ(trajectories.substr(0, trajectories.find('\n')),
-            "time_s,robot,x_mm,y_mm,heading_rad,led_r,led_g,led_b,group,state");
+            "time_s,robot,x_mm,y_mm,heading_rad,led_r,led_g,led_b,group,state,failed");
   EXPECT_EQ(std::count(trajectories.begin(), trajectories.end(), '\n'), 1 + 20 * 4);
   const std::string messages = read(scratch / "m.csv");
   EXPECT_EQ(messages.substr(0, messages.find('\n')), "receiver,sender,count,sent_if_receiver_is_sender");
@@ -194,7 +194,7 @@ TEST_F(Commands, DefineReachesTheProgram) {
         "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
   run(small({"--behaviour", scratch / "p.c", "--define", "COLOUR=RGB(3,0,1)"}), scratch, "run");
   ASSERT_EQ(kilotwin({"export", scratch / "run", "--trajectories", scratch / "t.csv"}, scratch).status, 0);
-  EXPECT_NE(read(scratch / "t.csv").find(",3,0,1,0,running\n"), std::string::npos);
+  EXPECT_NE(read(scratch / "t.csv").find(",3,0,1,0,running,0\n"), std::string::npos);
 }
 
 TEST_F(Commands, AModelFileGivesARobotItsOwnBias) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -133,6 +134,37 @@ TEST_F(Control, TheCommandSteersARun) {
   EXPECT_EQ(none.status, 1);
   EXPECT_NE(none.err.find("no run on domain " + domain), std::string::npos) << none.err;
   EXPECT_EQ(kilotwin({"control", "step", "--domain", domain}, scratch_).status, 2);
+}
+
+TEST_F(Control, ARobotIsPlacedElsewhereAndTheReplayDoesTheSame) {
+  start();
+  const Words domain{"--domain", std::to_string(domain_)};
+  const auto place = [&](Words words) {
+    words.insert(words.begin(), {"control", "place"});
+    words.insert(words.end(), domain.begin(), domain.end());
+    return kilotwin(words, scratch_);
+  };
+  const Outcome placed = place({"--robot", "3", "--at", "-600", "580", "--heading", "90"});
+  EXPECT_EQ(placed.status, 0) << placed.err;
+  const Outcome outside = place({"--robot", "4", "--at", "5000", "0", "--patience", "0.5"});
+  EXPECT_EQ(outside.status, 1);
+  EXPECT_NE(outside.err.find("robot 4 did not come to stand there"), std::string::npos) << outside.err;
+  EXPECT_EQ(place({"--robot", "4"}).status, 2);
+  ask(kilotwin_open_STOP_RUN);
+  EXPECT_EQ(process_->wait(30).status, 0);
+  recorder::Reader reader(scratch_ / "run/recording.ktrec");
+  std::vector<proto::InputRecord> inputs;
+  bool was_there = false;
+  while (const proto::Record* record = reader.next()) {
+    if (record->has_input() && record->input().kind() == proto::InputRecord::RELOCATION)
+      inputs.push_back(record->input());
+    if (record->has_state() && !inputs.empty())
+      was_there = was_there || std::hypot(record->state().x_mm(3) + 600, record->state().y_mm(3) - 580) < 30;
+  }
+  ASSERT_EQ(inputs.size(), 1u);
+  EXPECT_EQ(inputs[0].robot(), 3u);
+  EXPECT_TRUE(was_there);
+  EXPECT_EQ(kilotwin({"replay", scratch_ / "run", "--verify"}, scratch_).status, 0);
 }
 
 TEST_F(Control, ExternalOverheadPacketsAreStampedRecordedAndReplayed) {

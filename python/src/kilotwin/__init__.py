@@ -14,6 +14,7 @@ names of columns: _s seconds, _mm millimetres, _rad radians.
 
 from kilotwin._arenas import Arena, Arenas
 from kilotwin._identify import Identification, identify
+from kilotwin._live import Live, join
 from kilotwin._program import KilotwinError, program
 from kilotwin._run import Run, load, replay, run
 from kilotwin._sweep import Sweep, sweep
@@ -25,11 +26,13 @@ __all__ = [
     "Arenas",
     "Identification",
     "KilotwinError",
+    "Live",
     "Run",
     "Sweep",
     "Table",
     "Tuned",
     "identify",
+    "join",
     "load",
     "program",
     "replay",

@@ -15,6 +15,7 @@ from typing import Any, Iterable, Mapping, Sequence
 import numpy as np
 
 from kilotwin._program import KilotwinError, common_words, program, text_of
+from kilotwin._requests import ask, end_of_process, notes
 
 
 class Arenas:
@@ -66,7 +67,7 @@ class Arenas:
         self._process = subprocess.Popen(
             words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said, text=True, start_new_session=True
         )
-        self._closed = weakref.finalize(self, _end, self._process)
+        self._closed = weakref.finalize(self, end_of_process, self._process)
         line = self._process.stdout.readline()  # type: ignore[union-attr]
         if not line:
             raise self._end_of_process()
@@ -221,6 +222,24 @@ class Arenas:
             request["arenas"] = [int(arena) for arena in arenas]
         self._ask({"send": request})
 
+    def place(
+        self,
+        robot: int,
+        x_mm: float,
+        y_mm: float,
+        heading_rad: float = 0.0,
+        *,
+        movable: bool = False,
+        arenas: Sequence[int] | None = None,
+    ) -> None:
+        """Puts a robot, or with `movable` a movable body, elsewhere: it stands there after the next step. x_mm, y_mm: its centre, from
+        the arena's centre; heading_rad: anticlockwise from x. Raises KilotwinError where it cannot stand there."""
+        request: dict[str, Any] = {"movable" if movable else "robot": int(robot)}
+        request.update(x_mm=float(x_mm), y_mm=float(y_mm), heading_rad=float(heading_rad))
+        if arenas is not None:
+            request["arenas"] = [int(arena) for arena in arenas]
+        self._ask({"place": request})
+
     def set_variable(self, name: str, values: Any) -> None:
         """Sets a variable of the programs, between two ticks. `values`: one, or an array that fits (arenas, robots); NaN leaves a
         robot's variable as it is. Before the first step it changes what the programs begin with."""
@@ -255,23 +274,14 @@ class Arenas:
     def _ask(self, request: dict[str, Any]) -> Any:
         if not self._closed.alive:
             raise KilotwinError("the arenas are closed", 1)
-        try:
-            self._process.stdin.write(json.dumps(request) + "\n")  # type: ignore[union-attr]
-            self._process.stdin.flush()  # type: ignore[union-attr]
-            line = self._process.stdout.readline()  # type: ignore[union-attr]
-        except BrokenPipeError:
-            line = ""
-        if not line:
+        answer = ask(self._process, request)
+        if answer is None:
             raise self._end_of_process()
-        answer = json.loads(line)
-        if "error" in answer:
-            raise KilotwinError(answer["error"], answer["status"])
         return answer
 
     def _notes(self) -> list[str]:
         """What the process has said to people."""
-        self._said.seek(0)
-        return [line.rstrip() for line in self._said if line.strip()]
+        return notes(self._said)
 
     def _end_of_process(self) -> KilotwinError:
         """Why the process has ended."""
@@ -289,13 +299,3 @@ class Arena(Arenas):
 
     def _view(self, array: np.ndarray) -> np.ndarray:
         return array[0]
-
-
-def _end(process: subprocess.Popen[str]) -> None:
-    """The arenas end when nobody can ask them any more."""
-    for stream in (process.stdin, process.stdout):
-        try:
-            stream.close()  # type: ignore[union-attr]
-        except BrokenPipeError:
-            pass
-    process.wait()

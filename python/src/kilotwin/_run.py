@@ -42,7 +42,7 @@ class Run:
         return self._tables[key]
 
     def trajectories(self, every_s: float = 1.0, measured: bool = False) -> Table:
-        """time_s, robot, x_mm, y_mm, heading_rad, led_r, led_g, led_b (0..3), group, state: rows by time, then by robot.
+        """time_s, robot, x_mm, y_mm, heading_rad, led_r, led_g, led_b (0..3), group, state, failed: rows by time, then by robot.
 
         every_s: seconds between a robot's rows, a multiple of the recorded interval. measured: poses as a tracker sees them.
         """

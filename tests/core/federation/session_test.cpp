@@ -531,6 +531,16 @@ TEST_F(Strangers, CannotAdmitARobotThatDoesNotExist) {
   EXPECT_NE(outcomes_[0].failure.find("malformed: its robot"), std::string::npos) << outcomes_[0].failure;
 }
 
+TEST_F(Strangers, CannotPlaceARobotOutsideTheArena) {
+  WireDirective directive{};
+  directive.run = plan_.run();
+  directive.kind = kilotwin_wire_RELOCATION;
+  directive.tick = 30;
+  directive.x_mm = 1e9;
+  interfere(topics::directives(), directive);
+  EXPECT_NE(outcomes_[0].failure.find("malformed: its place"), std::string::npos) << outcomes_[0].failure;
+}
+
 TEST_F(Strangers, CannotSendHalfAPacket) {
   WireDirective directive{};
   directive.run = plan_.run();

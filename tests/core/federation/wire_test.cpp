@@ -100,6 +100,15 @@ TEST(Wire, CarriesDirectives) {
   ASSERT_TRUE(from_wire(to_wire(3, out), in));
   EXPECT_EQ(in.membership.robot, 4u);
   EXPECT_EQ(in.membership.membership, Membership::kLost);
+
+  out.kind = DirectiveKind::kRelocation;
+  out.relocation = {true, 2, {1.5, -2.5, 0.25}};
+  ASSERT_TRUE(from_wire(to_wire(3, out), in));
+  EXPECT_TRUE(in.relocation.movable);
+  EXPECT_EQ(in.relocation.body, 2u);
+  EXPECT_EQ(in.relocation.pose.x_mm, 1.5);
+  EXPECT_EQ(in.relocation.pose.y_mm, -2.5);
+  EXPECT_EQ(in.relocation.pose.heading_rad, 0.25);
 }
 
 TEST(Wire, CarriesTrackedRobots) {

@@ -38,7 +38,8 @@ class Swarm {
   }
 
   /// `tracked`: by ascending robot.
-  void step(const std::vector<TrackedPlace>& tracked = {}, const std::vector<MembershipChange>& memberships = {}) {
+  void step(const std::vector<TrackedPlace>& tracked = {}, const std::vector<MembershipChange>& memberships = {},
+            const std::vector<Relocation>& relocations = {}) {
     TrackingFrame tracking;
     tracking.tick = tick_;
     for (const TrackedPlace& place : tracked) {
@@ -67,7 +68,7 @@ class Swarm {
       for (const auto& [pair, frame] : ghosts) {
         if (pair.second == p) in.push_back(&frame);
       }
-      engines_[p]->step(tick_, {in, actuation, &tracking, memberships});
+      engines_[p]->step(tick_, {in, actuation, &tracking, memberships, relocations});
     }
     ++tick_;
   }
