@@ -8,6 +8,7 @@
 
 #include "clients/recorder/swarm_observables.hpp"
 #include "core/base/error.hpp"
+#include "core/observations/variable_sampler.hpp"
 #include "core/os/files.hpp"
 #include "services/behaviours/program_variables.hpp"
 
@@ -55,6 +56,22 @@ void add_scalar(proto::Manifest& manifest, const behaviours::ScalarVariable& sca
   *variable.add_place() = place_of(scalar, program);
 }
 
+/// Whether the name is the robots' battery. Throws UserError, without a place, where it cannot be.
+bool is_battery(const std::string& name, const proto::Experiment& experiment,
+                const std::vector<std::string>& elves) {
+  if (name != kBatteryVariable) return false;
+  for (const std::string& elf : elves) {
+    if (!behaviours::find_variable(elf, behaviours::VariablePath::parse(name)).empty())
+      throw UserError(fmt::format(
+          "{} is the voltage of the robots' batteries, and a program has a variable of that name; give the "
+          "program's another one",
+          name));
+  }
+  if (!experiment.has_battery())
+    throw UserError(fmt::format("{}: the experiment has no batteries; add battery {{ }} to it", name));
+  return true;
+}
+
 std::string names_in_words(const std::vector<std::string>& elves) {
   std::string text;
   std::size_t count = 0;
@@ -80,6 +97,10 @@ void add_recorded_variables(const LoadedExperiment& loaded, const std::vector<st
     const std::string place = fmt::format("recording.variable[{}].name", v);
     bool any = false;
     try {
+      if (is_battery(wanted.name(), loaded.experiment, elves)) {
+        entry_of(manifest, wanted.name(), wanted.every_s()).set_integer(false);
+        continue;
+      }
       const auto path = behaviours::VariablePath::parse(wanted.name());
       for (std::uint32_t program = 0; program < elves.size(); ++program) {
         for (const auto& scalar : behaviours::find_variable(elves[program], path)) {
@@ -94,7 +115,8 @@ void add_recorded_variables(const LoadedExperiment& loaded, const std::vector<st
       const std::string names = names_in_words(elves);
       throw loaded.locations.error(
           place,
-          fmt::format("no program has a global or static variable \"{}\"; {}", wanted.name(),
+          fmt::format("no program has a global or static variable \"{}\"; {}{}", wanted.name(),
+                      wanted.name() == "battery" ? "the voltage of the robots' batteries is battery_V; " : "",
                       names.empty() ? "firmware needs an .elf file with debug information" : "there are " + names));
     }
     if (static_cast<std::size_t>(manifest.variable_size()) > behaviours::kMostScalars)

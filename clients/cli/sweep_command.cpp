@@ -35,6 +35,7 @@ struct SweepArguments {
   /// The observable in the plots: clients/recorder/observables.hpp, or one of the experiment. Empty: pushed if there are movable bodies,
   /// else msd.
   std::string plot;
+  std::string colour_by, x_axis = "auto", y_axis = "linear";
   std::uint32_t jobs = 0;  ///< runs at a time; 0: one per core
   fs::path resume;         ///< a sweep to go on with
   bool slurm = false;
@@ -75,6 +76,8 @@ Sweep checked(const SweepArguments& arguments) {
     sweep.own_seeds.push_back(loaded.experiment.seed());
   }
   if (const auto wanted = built_in_observable(arguments.plot)) sweep.plotted = *wanted;
+  if (!arguments.colour_by.empty())
+    static_cast<void>(SweepColours(sweep.points, arguments.colour_by, std::nullopt));
   return sweep;
 }
 
@@ -95,13 +98,18 @@ void add_runs(const SweepArguments& arguments, Sweep& sweep) {
   }
 }
 
+SweepPlots plots_of(const SweepArguments& arguments, const Sweep& sweep) {
+  const AxisScale x = arguments.x_axis == "log"      ? AxisScale::kLogarithmic
+                      : arguments.x_axis == "linear" ? AxisScale::kLinear
+                                                     : AxisScale::kAutomatic;
+  return {sweep.plotted, arguments.plot, arguments.colour_by, x, arguments.y_axis == "log"};
+}
+
 /// The results of a sweep as they come.
 class Results {
  public:
   Results(const SweepArguments& arguments, const Sweep& sweep)
-      : sweep_(sweep), report_(sweep.name, sweep.points, sweep.plotted) {
-    report_.plot_own(arguments.plot);
-  }
+      : sweep_(sweep), report_(sweep.name, sweep.points, plots_of(arguments, sweep)) {}
   void take(const SweepRun& run) {
     if (!run.well)
       return complain(run, run.last_line.empty() ? "it printed nothing; is the disk full?" : run.last_line);
@@ -210,6 +218,19 @@ Command add_sweep(CLI::App& program) {
                  "what the plots show: an observable of the experiment, or msd, displacement, spread, nearest, "
                  "polarisation or pushed (default: pushed where there are movable bodies, else msd)")
       ->type_name("OBSERVABLE");
+  app.add_option("--colour-by", arguments->colour_by,
+                 "a swept field: in the plots, all runs with the same value are one curve; or group: a curve per "
+                 "group of robots")
+      ->type_name("FIELD");
+  app.add_option("--x-axis", arguments->x_axis,
+                 "of the plot against a swept field: linear, log, or auto, which is log for values of equal ratios")
+      ->check(CLI::IsMember({"auto", "linear", "log"}).description(""))
+      ->capture_default_str()
+      ->type_name("SCALE");
+  app.add_option("--y-axis", arguments->y_axis, "of both plots: linear or log")
+      ->check(CLI::IsMember({"linear", "log"}).description(""))
+      ->capture_default_str()
+      ->type_name("SCALE");
   app.add_option("--jobs", arguments->jobs, "runs at a time (default: one per core)")->type_name("N");
   app.add_option(
          "--latin", arguments->latin,

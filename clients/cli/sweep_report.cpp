@@ -21,9 +21,6 @@ namespace {
 using recorder::kObservables;
 using recorder::Sample;
 
-/// Largest number of curves that a reader can distinguish in one plot.
-constexpr std::size_t kMostCurves = 8;
-
 std::string with_error(const Sample& sample) {
   if (sample.count() == 0) return "-";
   if (sample.count() == 1) return fmt::format("{:.5g}", sample.mean());
@@ -61,27 +58,37 @@ std::string aligned(const std::vector<std::vector<std::string>>& rows) {
 
 }  // namespace
 
-SweepReport::SweepReport(std::string name, std::vector<SweepPoint> points, recorder::Observable plotted)
-    : name_(std::move(name)), points_(std::move(points)), plotted_(plotted), observed_(points_.size()) {
+SweepReport::SweepReport(std::string name, std::vector<SweepPoint> points, SweepPlots plots)
+    : name_(std::move(name)), points_(std::move(points)), plots_(std::move(plots)), observed_(points_.size()) {
   for (std::size_t field = 0; field < points_[0].size(); ++field) {
     const bool alike = std::all_of(points_.begin(), points_.end(),
                                    [&](const SweepPoint& point) { return point[field] == points_[0][field]; });
     if (!alike) varying_.push_back(field);
   }
-  // The response field is the one with the most different numbers.
-  std::size_t most = 1;
-  for (std::size_t field = 0; field < points_[0].size(); ++field) {
-    std::set<double> numbers;
-    bool all_numbers = true;
-    for (const SweepPoint& point : points_) {
-      const auto number = number_of(point[field]);
-      if (number) numbers.insert(*number);
-      all_numbers = all_numbers && number;
+  choose_response();
+  if (!plots_.colour_by.empty())
+    colours_.emplace(points_, plots_.colour_by, has_response() ? std::optional(response_field_) : std::nullopt);
+}
+
+/// The response field is the one with the most different numbers; that of the colours only if there is no other.
+void SweepReport::choose_response() {
+  for (const bool of_colours : {false, true}) {
+    std::size_t most = 1;
+    for (std::size_t field = 0; field < points_[0].size(); ++field) {
+      if ((field_of(points_[0][field]) == plots_.colour_by) != of_colours) continue;
+      std::set<double> numbers;
+      bool all_numbers = true;
+      for (const SweepPoint& point : points_) {
+        const auto number = number_of(point[field]);
+        if (number) numbers.insert(*number);
+        all_numbers = all_numbers && number;
+      }
+      if (all_numbers && numbers.size() > most) {
+        most = numbers.size();
+        response_field_ = field;
+      }
     }
-    if (all_numbers && numbers.size() > most) {
-      most = numbers.size();
-      response_field_ = field;
-    }
+    if (has_response()) return;
   }
 }
 
@@ -125,6 +132,24 @@ void SweepReport::add(std::size_t point, std::uint64_t seed, const std::filesyst
       if (i + 1 == states) at.at_end[o].add(value);
     }
   }
+  if (colours_) take_colours(point, curves, run);
+}
+
+ObservedCurve SweepReport::curve_of(const recorder::ObservableCurves& curves) const {
+  const std::size_t o = plotted();
+  return {curves.time_s, o < kObservables.size() ? curves.value[o] : curves.own[o - kObservables.size()].value};
+}
+
+void SweepReport::take_colours(std::size_t point, const recorder::ObservableCurves& curves,
+                               const std::filesystem::path& run) {
+  if (!colours_->by_group()) return colours_->add(point, 0, curve_of(curves));
+  const recorder::Reader first(run / "recording.ktrec");
+  const int groups = std::max(1, first.header().group_robots_size());
+  for (int group = 0; group < groups; ++group) {
+    recorder::Reader reader(run / "recording.ktrec");
+    const auto number = static_cast<std::uint32_t>(group);
+    colours_->add(point, number, curve_of(recorder::observe_group(reader, number)));
+  }
 }
 
 void SweepReport::add_failed(std::size_t point, std::uint64_t seed, const std::filesystem::path& run,
@@ -137,8 +162,8 @@ void SweepReport::add_failed(std::size_t point, std::uint64_t seed, const std::f
 }
 
 std::size_t SweepReport::plotted() const {
-  const auto own = std::find(own_.begin(), own_.end(), plotted_own_);
-  if (own == own_.end()) return static_cast<std::size_t>(plotted_);
+  const auto own = std::find(own_.begin(), own_.end(), plots_.own);
+  if (own == own_.end()) return static_cast<std::size_t>(plots_.observable);
   return kObservables.size() + static_cast<std::size_t>(own - own_.begin());
 }
 
@@ -245,7 +270,7 @@ std::string SweepReport::page(const recorder::Provenance& provenance) const {
   const auto add = [&](const Plot& plot, const std::string& caption) {
     figures << object({{"image", html::image(plot_svg(plot), caption)}, {"caption", caption}});
   };
-  add(curves(), "Over time, a curve per point");
+  add(curves(), colours_ ? "Over time, a curve per colour" : "Over time, a curve per point");
   if (has_response()) add(response(), "At the end of the runs");
   Data facts{Data::type::list};
   std::string words;
@@ -347,16 +372,23 @@ std::string SweepReport::runs_text() const {
 Plot SweepReport::plot() const {
   Plot plot;
   if (plotted() >= kObservables.size()) {
-    plot.title = fmt::format("{}: {}", name_, plotted_own_);
-    plot.y_name = plotted_own_;
+    plot.title = fmt::format("{}: {}", name_, plots_.own);
+    plot.y_name = plots_.own;
     return plot;
   }
   const recorder::ObservableInfo& observable = kObservables[plotted()];
   plot.title = fmt::format("{}: {}", name_, observable.title);
   plot.y_name = observable.title;
-  if (plotted_ == recorder::Observable::kMsd) plot.y_name = "MSD";
+  if (plots_.observable == recorder::Observable::kMsd) plot.y_name = "MSD";
   plot.y_unit = observable.unit;
   return plot;
+}
+
+bool SweepReport::x_logarithmic() const {
+  if (plots_.x != AxisScale::kAutomatic) return plots_.x == AxisScale::kLogarithmic;
+  std::vector<double> numbers;
+  for (const SweepPoint& point : points_) numbers.push_back(*number_of(point[response_field_]));
+  return have_equal_ratios(std::move(numbers));
 }
 
 Plot SweepReport::curves() const {
@@ -366,8 +398,13 @@ Plot SweepReport::curves() const {
   plot.subtitle = runs_text() + (errors ? "; shaded: standard error of the mean" : "");
   plot.x_name = "time";
   plot.x_unit = "s";
+  plot.y_logarithmic = plots_.y_logarithmic;
   if (varying_.size() == 1) plot.legend_title = field_of(points_[0][varying_[0]]);
   if (const std::string fields = constant(); !fields.empty()) plot.subtitle += "; " + fields;
+  if (colours_) {
+    colours_->add_curves(plot);
+    return plot;
+  }
   // If there are too many points, plot an evenly spaced selection that includes the first and the last.
   const std::size_t curves = std::min(points_.size(), kMostCurves);
   if (curves < points_.size()) plot.subtitle += fmt::format("; {} of {} points", curves, points_.size());
@@ -396,6 +433,12 @@ Plot SweepReport::response() const {
   plot.subtitle = "at the end of the runs, " + runs_text() + (errors ? "; bars: standard error of the mean" : "");
   if (const std::string fields = constant(); !fields.empty()) plot.subtitle += "; " + fields;
   plot.x_name = field_of(points_[0][response_field_]);
+  plot.x_logarithmic = x_logarithmic();
+  plot.y_logarithmic = plots_.y_logarithmic;
+  if (colours_) {
+    colours_->add_response(plot);
+    return plot;
+  }
   std::vector<std::string> names;
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Sample sample = observed_[i].at_end.empty() ? Sample() : observed_[i].at_end[plotted()];

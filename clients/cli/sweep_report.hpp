@@ -3,9 +3,11 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "clients/cli/sweep_colours.hpp"
 #include "clients/cli/sweep_points.hpp"
 #include "clients/recorder/observables.hpp"
 #include "clients/recorder/provenance.hpp"
@@ -14,12 +16,24 @@
 
 namespace kilotwin::cli {
 
+enum class AxisScale : std::uint8_t { kAutomatic, kLinear, kLogarithmic };
+
+/// How the plots of a sweep show an observable.
+struct SweepPlots {
+  recorder::Observable observable = recorder::Observable::kMsd;
+  std::string own;  ///< an observable of the experiment, instead
+  /// A curve and a colour for each value of this swept field, or for each "group" of robots. All points of that value, or that group,
+  /// are one sample. Empty: a curve per point.
+  std::string colour_by;
+  /// Of the swept field. Automatic: logarithmic where the values have equal ratios.
+  AxisScale x = AxisScale::kAutomatic;
+  bool y_logarithmic = false;
+};
+
 class SweepReport {
  public:
-  /// `plotted`: the observable that the plots show.
-  SweepReport(std::string name, std::vector<SweepPoint> points, recorder::Observable plotted);
-  /// The plots show this observable of the experiment instead.
-  void plot_own(const std::string& observable) { plotted_own_ = observable; }
+  /// Throws UserError if no such field is swept.
+  SweepReport(std::string name, std::vector<SweepPoint> points, SweepPlots plots);
 
   /// Adds a run that succeeded. Throws if its files cannot be read, or it has other observables than the runs before.
   void add(std::size_t point, std::uint64_t seed, const std::filesystem::path& run);
@@ -83,16 +97,22 @@ class SweepReport {
   [[nodiscard]] std::string fields_header() const;
   [[nodiscard]] std::string fields_of(std::size_t point) const;
 
+  void choose_response();
+  [[nodiscard]] bool x_logarithmic() const;
+  /// The plotted observable over time.
+  [[nodiscard]] ObservedCurve curve_of(const recorder::ObservableCurves& curves) const;
+  void take_colours(std::size_t point, const recorder::ObservableCurves& curves, const std::filesystem::path& run);
+
   std::string name_;
   std::vector<SweepPoint> points_;
-  recorder::Observable plotted_;
-  std::string plotted_own_;
+  SweepPlots plots_;
   std::vector<std::string> own_;  ///< observables of the experiment
   std::vector<Run> all_runs_;
   std::vector<Observed> observed_;
   std::size_t runs_ = 0;
   std::size_t response_field_ = most_fields_;  // index into a point
   std::vector<std::size_t> varying_;           // fields that differ between points, ascending
+  std::optional<SweepColours> colours_;
 };
 
 }  // namespace kilotwin::cli

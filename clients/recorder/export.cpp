@@ -47,7 +47,9 @@ void append_rows(Table& table, const proto::StateRecord& state, Tick tick, TickL
     const auto led = static_cast<unsigned char>(state.led()[i]);
     for (int channel = 0; channel < 3; ++channel) table.integer(led >> 2 * channel & 3);
     table.integer(groups[i]);
-    table.text(states[static_cast<unsigned char>(state.life_cycle()[i])]);
+    const auto life_cycle = static_cast<std::uint8_t>(state.life_cycle()[i]);
+    table.text(states[life_cycle]);
+    table.integer(life_cycle == static_cast<std::uint8_t>(LifeCycle::kFailed) ? 1 : 0);
     table.end_row();
   }
 }
@@ -132,7 +134,8 @@ std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path
                                     {"led_g", "", CellType::kInteger},
                                     {"led_b", "", CellType::kInteger},
                                     {"group", "", CellType::kInteger},
-                                    {"state", "", CellType::kText}};
+                                    {"state", "", CellType::kText},
+                                    {"failed", "", CellType::kInteger}};
   return export_states(recording, file, every_s, columns, metadata,
                        [&](Table& table, const proto::StateRecord& state, Tick tick) {
                          append_rows(table, state, tick, recording.tick_length(), which, groups, states);

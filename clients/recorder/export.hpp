@@ -18,7 +18,7 @@ enum class Poses { kTrue, kMeasured };
 /// led_r, led_g, led_b: 0..3. group: number of the robot's group, from 0 in the experiment's order. state: its life cycle:
 /// "running", "failed"...
 inline constexpr std::string_view kTrajectoryColumns =
-    "time_s,robot,x_mm,y_mm,heading_rad,led_r,led_g,led_b,group,state";
+    "time_s,robot,x_mm,y_mm,heading_rad,led_r,led_g,led_b,group,state,failed";
 /// The last column is 1 in rows whose count is the number of messages that the robot itself sent.
 inline constexpr std::string_view kMessageColumns = "receiver,sender,count,sent_if_receiver_is_sender";
 

@@ -4,7 +4,10 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
+#include <utility>
 
+#include "clients/recorder/export.hpp"
 #include "clients/recorder/ordered_records.hpp"
 #include "clients/recorder/statistics.hpp"
 #include "clients/recorder/swarm_observables.hpp"
@@ -110,9 +113,19 @@ void ObservableObserver::add(double time_s, std::span<const double> x_mm, std::s
   put(Observable::kPushed, pushed.count() > 0 ? pushed.mean() : std::numeric_limits<double>::quiet_NaN());
 }
 
-ObservableCurves observe(Reader& recording) {
+namespace {
+
+/// `only`: a group; nothing: all robots.
+ObservableCurves observe_robots(Reader& recording, std::optional<std::uint32_t> only) {
+  // Robots of a group are neighbours in every column.
+  const std::vector<std::uint32_t> groups = groups_of(recording.header());
+  const auto [begin, end] =
+      only ? std::equal_range(groups.begin(), groups.end(), *only) : std::pair(groups.begin(), groups.end());
+  const auto first = static_cast<std::size_t>(begin - groups.begin()),
+             count = static_cast<std::size_t>(end - begin);
+  const auto column = [&](const auto& field) { return values(field).subspan(first, count); };
   ObservableObserver observer;
-  SwarmObservables own(recording.header());
+  SwarmObservables own(recording.header(), only);
   std::vector<OwnCurve> curves;
   for (const std::string& name : own.names()) curves.push_back({name, {}});
   OrderedRecords ordered(recording, OrderedRecords::kStates | (own.any() ? OrderedRecords::kVariables : 0u));
@@ -121,7 +134,7 @@ ObservableCurves observe(Reader& recording) {
     if (!ordered.records().state) continue;
     const proto::StateRecord& state = *ordered.records().state;
     const double time_s = recording.tick_length().seconds_at(ordered.tick());
-    observer.add(time_s, values(state.x_mm()), values(state.y_mm()), values(state.heading_rad()),
+    observer.add(time_s, column(state.x_mm()), column(state.y_mm()), column(state.heading_rad()),
                  values(state.movable_x_mm()), values(state.movable_y_mm()));
     if (!own.any()) continue;
     const std::vector<double> at = own.values(time_s, state, observer.curves());
@@ -131,5 +144,11 @@ ObservableCurves observe(Reader& recording) {
   all.own = std::move(curves);
   return all;
 }
+
+}  // namespace
+
+ObservableCurves observe(Reader& recording) { return observe_robots(recording, std::nullopt); }
+
+ObservableCurves observe_group(Reader& recording, std::uint32_t group) { return observe_robots(recording, group); }
 
 }  // namespace kilotwin::recorder

@@ -138,6 +138,23 @@ Json tracking_json(const TrackingTotals& t) {
               {"trackers", trackers}};
 }
 
+Json federates_json(const std::vector<FederateTime>& federates) {
+  Json json = Json::array();
+  for (const FederateTime& one : federates)
+    json.push_back(
+        Json{{"name", one.name}, {"step_s", one.step_s}, {"exchange_s", one.exchange_s}, {"wait_s", one.wait_s}});
+  return json;
+}
+
+std::vector<FederateTime> federates_of(const Json& json) {
+  std::vector<FederateTime> federates;
+  for (const Json& one : json) {
+    federates.push_back({one.at("name").get<std::string>(), one.at("step_s").get<double>(),
+                         one.at("exchange_s").get<double>(), one.at("wait_s").get<double>()});
+  }
+  return federates;
+}
+
 }  // namespace
 
 void write_summary(const Summary& s, const std::filesystem::path& file) {
@@ -185,6 +202,7 @@ void write_summary(const Summary& s, const std::filesystem::path& file) {
       {"cores", s.provenance.cores},
   };
   for (const auto& [name, value] : s.observables) json["observables"][name] = value;
+  if (!s.federates.empty()) json["federates"] = federates_json(s.federates);
   if (!s.station.plugins.empty()) json["station"] = station_json(s.station);
   if (s.paced) {
     json["late_ticks"] = s.lateness.late_ticks;
@@ -239,6 +257,8 @@ Summary read_summary(const std::filesystem::path& file) {
     s.cost_ns_per_robot_tick = {cost.value("behaviours", 0.0), cost.value("physics", 0.0),
                                 cost.value("radio", 0.0),      cost.value("station", 0.0),
                                 cost.value("exchange", 0.0),   cost.value("recording", 0.0)};
+    if (const auto federates = json.find("federates"); federates != json.end())
+      s.federates = federates_of(*federates);
     s.provenance = {json.value("version", ""), json.value("build", ""),
                     json.value("date", ""),    json.value("command_line", std::vector<std::string>{}),
                     json.value("host", ""),    json.value("cores", 0u)};

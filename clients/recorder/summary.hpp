@@ -69,6 +69,7 @@ struct Summary {
     double behaviours = 0, physics = 0, radio = 0, station = 0, exchange = 0, recording = 0;
     [[nodiscard]] double total() const { return behaviours + physics + radio + station + exchange + recording; }
   } cost_ns_per_robot_tick;
+  std::vector<FederateTime> federates;  ///< of a federated run; empty: none is known
 
   /// Simulated time per wall time, over the ticks that this run itself stepped; 0 if there are none.
   [[nodiscard]] double realtime_factor() const;

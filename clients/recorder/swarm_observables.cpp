@@ -54,7 +54,8 @@ NameKind kind_of_name(const std::string& name, const std::vector<std::string>& v
   return NameKind::kUnknown;
 }
 
-SwarmObservables::SwarmObservables(const proto::RecordingHeader& header) : groups_(groups_of(header)) {
+SwarmObservables::SwarmObservables(const proto::RecordingHeader& header, std::optional<std::uint32_t> only)
+    : groups_(groups_of(header)), only_(only) {
   for (const proto::VariableColumn& variable : header.variable()) variables_.push_back(variable.name());
   for (const proto::Observable& observable : header.observable()) {
     try {
@@ -77,6 +78,7 @@ void SwarmObservables::take(const proto::VariableRecord& variable) {
   const auto column = columns_.find(variables_[variable.variable()]);
   if (column == columns_.end()) return;
   for (int i = 0; i < variable.robot_size(); ++i) {
+    if (!counts(variable.robot(i))) continue;
     column->second[variable.robot(i)] =
         variable.integer_size() != 0 ? static_cast<double>(variable.integer(i)) : variable.number(i);
   }
@@ -87,7 +89,10 @@ void SwarmObservables::fill(double time_s, const proto::StateRecord& state, cons
     const bool is_variable = std::find(variables_.begin(), variables_.end(), name) != variables_.end();
     if (!uses(name) || is_variable) return;
     std::vector<double>& column = columns_.at(name);
-    for (std::size_t i = 0; i < column.size(); ++i) column[i] = static_cast<double>(value(static_cast<int>(i)));
+    const bool per_robot = kind_of_name(name, variables_) == NameKind::kPerRobot;
+    for (std::size_t i = 0; i < column.size(); ++i) {
+      if (!per_robot || counts(i)) column[i] = static_cast<double>(value(static_cast<int>(i)));
+    }
   };
   const auto led = [&](int i) { return static_cast<std::uint8_t>(state.led()[static_cast<std::size_t>(i)]); };
   const auto life_cycle = [&](int i) {

@@ -6,7 +6,9 @@
 /// and the observables of observables.hpp: msd, spread, nearest...
 #pragma once
 
+#include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,8 +22,8 @@ namespace kilotwin::recorder {
 
 class SwarmObservables {
  public:
-  /// Throws UserError, with the observable's name, where an expression cannot be read.
-  explicit SwarmObservables(const proto::RecordingHeader& header);
+  /// `only`: robots of other groups count nowhere. Throws UserError, with the observable's name, where an expression cannot be read.
+  explicit SwarmObservables(const proto::RecordingHeader& header, std::optional<std::uint32_t> only = {});
 
   [[nodiscard]] bool any() const { return !expressions_.empty(); }
   [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
@@ -32,12 +34,14 @@ class SwarmObservables {
                                            const ObservableCurves& curves);
 
  private:
+  [[nodiscard]] bool counts(std::size_t robot) const { return !only_ || groups_[robot] == *only_; }
   [[nodiscard]] bool uses(const std::string& name) const { return columns_.count(name) != 0; }
   void fill(double time_s, const proto::StateRecord& state, const ObservableCurves& curves);
 
   std::vector<std::string> names_, variables_;
   std::vector<Expression> expressions_;
   std::vector<std::uint32_t> groups_;
+  const std::optional<std::uint32_t> only_;
   std::map<std::string, std::vector<double>> columns_;  ///< the values of each name that is used
   std::vector<double> start_x_mm_, start_y_mm_;
 };

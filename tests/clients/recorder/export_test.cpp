@@ -38,15 +38,15 @@ TEST(Export, TrajectoriesByTimeAndRobot) {
   EXPECT_EQ(lines_of(scratch / "t.csv"),
             (std::vector<std::string>{
                 std::string(kTrajectoryColumns),
-                "0,0,0.0000,0.0000,0.000000,0,0,0,0,running",
-                "0,1,10.0000,-5.0000,0.100000,1,0,0,0,running",
-                "0,2,20.0000,-10.0000,0.200000,2,0,0,0,failed",
-                "1.015808,0,15.5000,0.0000,0.000000,0,0,0,0,running",  // tick 31 is the first at or after 1 s
-                "1.015808,1,25.5000,2.7500,0.100000,1,0,0,0,running",
-                "1.015808,2,35.5000,5.5000,0.200000,2,0,0,0,failed",
-                "2.031616,0,31.0000,0.0000,0.000000,0,0,0,0,running",
-                "2.031616,1,41.0000,10.5000,0.100000,1,0,0,0,running",
-                "2.031616,2,51.0000,21.0000,0.200000,2,0,0,0,failed",
+                "0,0,0.0000,0.0000,0.000000,0,0,0,0,running,0",
+                "0,1,10.0000,-5.0000,0.100000,1,0,0,0,running,0",
+                "0,2,20.0000,-10.0000,0.200000,2,0,0,0,failed,1",
+                "1.015808,0,15.5000,0.0000,0.000000,0,0,0,0,running,0",  // tick 31 is the first at or after 1 s
+                "1.015808,1,25.5000,2.7500,0.100000,1,0,0,0,running,0",
+                "1.015808,2,35.5000,5.5000,0.200000,2,0,0,0,failed,1",
+                "2.031616,0,31.0000,0.0000,0.000000,0,0,0,0,running,0",
+                "2.031616,1,41.0000,10.5000,0.100000,1,0,0,0,running,0",
+                "2.031616,2,51.0000,21.0000,0.200000,2,0,0,0,failed,1",
             }));
 }
 
@@ -64,9 +64,9 @@ TEST(Export, NumbersAreRoundedAndNeverMinusZero) {
   export_trajectories(reader, scratch / "t.csv");
   EXPECT_EQ(
       lines_of(scratch / "t.csv"),
-      (std::vector<std::string>{std::string(kTrajectoryColumns), "0,0,0.0000,-0.5000,-3.141593,3,3,3,0,running",
-                                "0,1,0.0001,1000000.0000,3.141593,1,2,3,0,running",
-                                "0,2,-1234.5679,1000.0000,0.000000,3,3,3,0,running"}));
+      (std::vector<std::string>{std::string(kTrajectoryColumns), "0,0,0.0000,-0.5000,-3.141593,3,3,3,0,running,0",
+                                "0,1,0.0001,1000000.0000,3.141593,1,2,3,0,running,0",
+                                "0,2,-1234.5679,1000.0000,0.000000,3,3,3,0,running,0"}));
 }
 
 TEST(Export, WantedTimesTakeTheFirstStateAtOrAfter) {
@@ -200,8 +200,8 @@ TEST(Export, GroupsAndStatesAreNamed) {
   export_trajectories(reader, scratch / "t.csv");
   EXPECT_EQ(lines_of(scratch / "t.csv"),
             (std::vector<std::string>{
-                std::string(kTrajectoryColumns), "0,0,0.0000,0.0000,0.000000,0,0,0,0,sleeping",
-                "0,1,0.0000,0.0000,0.000000,3,0,0,0,flat", "0,2,0.0000,0.0000,0.000000,0,3,0,1,77"}));
+                std::string(kTrajectoryColumns), "0,0,0.0000,0.0000,0.000000,0,0,0,0,sleeping,0",
+                "0,1,0.0000,0.0000,0.000000,3,0,0,0,flat,0", "0,2,0.0000,0.0000,0.000000,0,3,0,1,77,0"}));
 }
 
 TEST(Export, TablesWhoseNameEndsInGzAreGzipped) {

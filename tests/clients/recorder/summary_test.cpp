@@ -34,6 +34,7 @@ Summary example() {
   s.recoveries = 2;
   s.moved_mm = {12.5, 99};
   s.cost_ns_per_robot_tick = {300, 200, 500, 1, 100, 10};
+  s.federates = {{"physics 0,0", 3, 0.5, 1}, {"radio", 1, 0.25, 3.25}};
   s.provenance = {"0.1.0", "0.1.0-0123", "2026-11-22T21:25:00Z", {"kilotwin", "run", "a b.txtpb"}, "lab", 2};
   return s;
 }
@@ -73,7 +74,9 @@ TEST(Summary, HasTheFieldsOfTheContract) {
   EXPECT_EQ(json["command_line"], (std::vector<std::string>{"kilotwin", "run", "a b.txtpb"}));
   EXPECT_EQ(json["cores"], 2);
   EXPECT_TRUE(json.contains("failures"));
-  EXPECT_EQ(json.size(), 29u);
+  EXPECT_EQ(json["federates"][1],
+            (nlohmann::json{{"name", "radio"}, {"step_s", 1.0}, {"exchange_s", 0.25}, {"wait_s", 3.25}}));
+  EXPECT_EQ(json.size(), 30u);
 }
 
 TEST(Summary, ReadsBackWhatWasWritten) {
