@@ -110,16 +110,17 @@ async function drawing() {
   say("A recording with a state every 0.1 s plays at real time. Chromium without a window draws 1280 x 720 by software (SwiftShader).");
   say("The browser asks for at most 60 frames per second. The CPU time is that of all its processes; it tells how many frames a machine");
   say("draws that does nothing else.\n");
-  say("| robots | trails | frames drawn per second | CPU time of a frame | bytes of a frame | bytes per second to the viewer | load |\n|---|---|---|---|---|---|---|");
+  say("| robots | trails | messages in a picture | frames drawn per second | CPU time of a frame | bytes of a frame | bytes per second to the viewer | load |\n|---|---|---|---|---|---|---|---|");
   const { browser, reason } = await launchBrowser(npm);
   if (reason) throw new Error(reason);
   try {
-    for (const [robots, states, trails] of [[1000, 200, true], [1000, 200, false], [10000, 120, false], [100000, 60, false]]) {
+    for (const [robots, states, trails, messages] of [[1000, 200, true, true], [1000, 200, true, false], [1000, 200, false, false], [10000, 120, false, true], [10000, 120, false, false], [100000, 60, false, false]]) {
       const served = await Served.start([view, "view", recordingOf(robots, states, 0.1)], scratch);
       const page = await browser.newPage({ viewport: { width: 1280, height: 720 } });
       await page.goto(served.address);
       await eventually("a picture", () => page.evaluate(() => window.kilotwin.drawn > 3));
       if (!trails && robots <= 5000) await page.keyboard.press("t"); // larger swarms begin without
+      if (messages !== robots <= 5000) await page.keyboard.press("m");
       await pause(2);
       const counters = () => page.evaluate(() => ({ ...window.kilotwin, now: performance.now() }));
       const before = await counters();
@@ -130,7 +131,7 @@ async function drawing() {
       const passed = (after.now - before.now) / 1000;
       const frames = after.received - before.received;
       const perSecond = (name) => (after[name] - before[name]) / passed;
-      say(`| ${robots} | ${trails ? "yes" : "no"} | ${perSecond("drawn").toFixed(1)} | ${(1000 * cpuOfFrame).toFixed(0)} ms | ${Math.round((after.bytes - before.bytes) / Math.max(1, frames))} | ${(perSecond("bytes") / 1000).toFixed(0)} kB/s | ${load()} |`);
+      say(`| ${robots} | ${trails ? "yes" : "no"} | ${((after.flights - before.flights) / Math.max(1, after.drawn - before.drawn)).toFixed(0)} | ${perSecond("drawn").toFixed(1)} | ${(1000 * cpuOfFrame).toFixed(0)} ms | ${Math.round((after.bytes - before.bytes) / Math.max(1, frames))} | ${(perSecond("bytes") / 1000).toFixed(0)} kB/s | ${load()} |`);
       await page.close();
       await served.stop();
     }

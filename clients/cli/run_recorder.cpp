@@ -29,8 +29,19 @@ proto::RecordingHeader header_of(const RunPlan& plan, const recorder::RunDirecto
 }
 
 proto::InputRecord::Kind kind_of(DirectiveKind kind) {
-  return kind == DirectiveKind::kMembership ? proto::InputRecord::MEMBERSHIP
-                                            : static_cast<proto::InputRecord::Kind>(kind);
+  switch (kind) {
+    case DirectiveKind::kMembership: return proto::InputRecord::MEMBERSHIP;
+    case DirectiveKind::kRelocation: return proto::InputRecord::RELOCATION;
+    default: return static_cast<proto::InputRecord::Kind>(kind);
+  }
+}
+
+DirectiveKind kind_of(proto::InputRecord::Kind kind) {
+  switch (kind) {
+    case proto::InputRecord::MEMBERSHIP: return DirectiveKind::kMembership;
+    case proto::InputRecord::RELOCATION: return DirectiveKind::kRelocation;
+    default: return static_cast<DirectiveKind>(kind);
+  }
 }
 
 }  // namespace
@@ -225,6 +236,7 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   costs.station = cost(Work::kStation);
   costs.exchange = cost(Work::kExchange);
   costs.recording = cost(Work::kRecording);
+  summary.federates = totals.federates;
   summary.provenance = recorder::read_provenance(directory_.provenance()).value_or(recorder::Provenance{});
   if (header_.observable_size() > 0 && any_state_) {
     recorder::Reader recording(directory_.recording());
@@ -257,6 +269,14 @@ proto::InputRecord to_record(const Directive& directive) {
     record.set_robot(directive.membership.robot);
     record.set_membership(static_cast<proto::InputRecord::Membership>(directive.membership.membership));
   }
+  if (directive.kind == DirectiveKind::kRelocation) {
+    const auto& [movable, body, pose] = directive.relocation;
+    record.set_robot(body);
+    record.set_movable(movable);
+    record.set_x_mm(pose.x_mm);
+    record.set_y_mm(pose.y_mm);
+    record.set_heading_rad(pose.heading_rad);
+  }
   return record;
 }
 
@@ -264,11 +284,11 @@ Directive from_record(const proto::InputRecord& record) {
   Directive directive;
   directive.sequence_number = record.sequence_number();
   directive.tick = Tick{record.tick()};
-  directive.kind = record.kind() == proto::InputRecord::MEMBERSHIP ? DirectiveKind::kMembership
-                                                                   : static_cast<DirectiveKind>(record.kind());
+  directive.kind = kind_of(record.kind());
   directive.steps = record.steps();
   directive.packet = packet_of(record.packet()).value_or(OverheadPacket{}).at(record.packet_offset_cycles());
   directive.membership = {record.robot(), static_cast<Membership>(record.membership())};
+  directive.relocation = {record.movable(), record.robot(), {record.x_mm(), record.y_mm(), record.heading_rad()}};
   return directive;
 }
 

@@ -68,7 +68,8 @@ class RunRecorder : public RunObserver {
 /// Whether a directive affects results, so that a replay must repeat it. Pauses and checkpoints do not, and the recording's end
 /// replaces a stop.
 [[nodiscard]] inline bool changes_results(const Directive& directive) {
-  return directive.kind == DirectiveKind::kOverheadInput || directive.kind == DirectiveKind::kMembership;
+  return directive.kind == DirectiveKind::kOverheadInput || directive.kind == DirectiveKind::kMembership ||
+         directive.kind == DirectiveKind::kRelocation;
 }
 [[nodiscard]] Directive from_record(const proto::InputRecord& record);
 

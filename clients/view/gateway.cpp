@@ -295,7 +295,10 @@ class Gateway::Service {
       case Request::Kind::kPlots:
       case Request::Kind::kPlot:
       case Request::Kind::kProgram:
-      case Request::Kind::kOutside: return viewer.ask(request);
+      case Request::Kind::kOutside:
+      case Request::Kind::kFlights:
+      case Request::Kind::kWork:
+      case Request::Kind::kMarks: return viewer.ask(request);
       default: break;
     }
     if (!viewer.may_steer)
@@ -373,6 +376,9 @@ class Gateway::Service {
       case Request::Kind::kRobot: return answers_->robot(request.robot);
       case Request::Kind::kProgram: return answers_->program(request.robot, request.tick);
       case Request::Kind::kOutside: return answers_->outside(request.tick);
+      case Request::Kind::kFlights: return answers_->flights(request.from, request.tick);
+      case Request::Kind::kWork: return answers_->work();
+      case Request::Kind::kMarks: return answers_->marks();
       case Request::Kind::kPlots: return answers_->plots();
       case Request::Kind::kPlot:
         return answers_->plot(request.number, request.of_robot ? std::optional(request.robot) : std::nullopt);

@@ -40,6 +40,10 @@ class Answers {
   [[nodiscard]] virtual std::string plot(std::uint32_t number, std::optional<std::uint32_t> robot) = 0;
   [[nodiscard]] virtual std::string program(std::uint32_t robot, std::int64_t tick) = 0;
   [[nodiscard]] virtual std::string outside(std::int64_t tick) = 0;
+  /// Messages that ended after `from`, up to `tick`.
+  [[nodiscard]] virtual std::string flights(std::int64_t from, std::int64_t tick) = 0;
+  [[nodiscard]] virtual std::string work() = 0;
+  [[nodiscard]] virtual std::string marks() = 0;
   /// Steers the run. Returns empty, or why it cannot.
   [[nodiscard]] virtual std::string steer(const Request& request) = 0;
 };

@@ -10,8 +10,10 @@
 
 #include "clients/recorder/tracker_records.hpp"
 #include "clients/view/run_text.hpp"
+#include "clients/view/watched_plan.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
+#include "core/federation/frame_check.hpp"
 #include "idl/experiment.pb.h"
 
 namespace kilotwin::view {
@@ -23,6 +25,11 @@ constexpr auto kLookAtRecording = 250ms;
 /// A place that a tracker stated is shown for so long.
 constexpr auto kPlaceHolds = 1s;
 constexpr std::size_t kMostTrackers = 16;
+/// Messages are read for so long after a viewer has asked for them.
+constexpr auto kFlightsWanted = 2s;
+
+/// Best effort, unlike the station's own reader: no federate waits for this one.
+dds::Channel watched_metrics() { return {topics::metrics().topic, dds::Delivery::kSensor, ""}; }
 
 /// Unique among processes that steer a run.
 std::string client_name() { return fmt::format("kilotwin view {} {}", getpid(), random_token().substr(0, 8)); }
@@ -82,6 +89,7 @@ LiveRun::LiveRun(const dds::Transport& transport, std::filesystem::path director
       participant_(transport),
       control_(participant_, topics::run_control()),
       overhead_(participant_, topics::overhead_packets()),
+      relocations_(participant_, topics::relocations()),
       statuses_(participant_, topics::run_status(),
                 [this](const PublicRunStatus& sample, dds::SampleState state) {
                   if (!state.valid) return;
@@ -97,6 +105,10 @@ LiveRun::LiveRun(const dds::Transport& transport, std::filesystem::path director
                        [this](const PublicStationPacket& sample, dds::SampleState state) {
                          if (state.valid) on_packet(sample);
                        }),
+      metrics_(participant_, watched_metrics(),
+               [this](const WireMetrics& sample, dds::SampleState state) {
+                 if (state.valid) on_metrics(sample);
+               }),
       client_(client_name()) {}
 
 LiveRun::~LiveRun() = default;
@@ -155,15 +167,19 @@ void LiveRun::begin(Gateway& gateway) {
     outline.firmware.push_back(program.ends_with(".hex") || program.ends_with(".elf"));
   }
   try {
+    const std::shared_ptr<const RunPlan> plan = plan_of(*facts.experiment);
+    if (plan) outline.ghost_margin_mm = ghost_margin_mm(*plan);
     const std::string text = run_text(outline, *facts.experiment);
     grid_ = grid_of(*facts.experiment);
     run_ = facts.run;
     {
       const std::lock_guard lock(mutex_);
       recording_.reset();
-      trackers_ = trackers_of(*facts.experiment);
+      plan_ = plan;
       frames_.clear();
       packets_.clear();
+      live_work_.clear();
+      live_flights_.clear();
     }
     gateway.show(*this, text);
     if (tells_) say(fmt::format("kilotwin: sees run {}, {} robots", one_line(facts.name, 128), facts.robots));
@@ -218,15 +234,17 @@ std::string LiveRun::program(std::uint32_t robot, std::int64_t tick) {
 void LiveRun::on_tracker_frame(const PublicTrackerFrame& frame) {
   const std::lock_guard lock(mutex_);
   if (run_ == 0 || (frame.run != 0 && frame.run != run_)) return;
+  static const std::vector<TrackerSettings> none;
+  const std::vector<TrackerSettings>& trackers = plan_ ? plan_->tracking_settings().trackers : none;
   // Sources that the experiment does not name have no place in the arena, unless it names none.
-  const auto named = std::find_if(trackers_.begin(), trackers_.end(), [&frame](const TrackerSettings& tracker) {
+  const auto named = std::find_if(trackers.begin(), trackers.end(), [&frame](const TrackerSettings& tracker) {
     return tracker.source == frame.source;
   });
-  if (named == trackers_.end() && !trackers_.empty()) return;
+  if (named == trackers.end() && !trackers.empty()) return;
   if (!frames_.contains(frame.source) && frames_.size() >= kMostTrackers) return;
-  std::optional<TrackerSample> sample = tracker_sample(frame, named == trackers_.end() ? 0 : named->first_robot);
+  std::optional<TrackerSample> sample = tracker_sample(frame, named == trackers.end() ? 0 : named->first_robot);
   if (!sample) return;
-  sample->source = static_cast<std::uint32_t>(named - trackers_.begin());
+  sample->source = static_cast<std::uint32_t>(named - trackers.begin());
   frames_[frame.source] = {std::move(*sample), Clock::now()};
 }
 
@@ -245,8 +263,10 @@ std::string LiveRun::outside(std::int64_t tick) {
   Outside outside;
   {
     const std::lock_guard lock(mutex_);
+    const TrackingSettings none;
+    const std::vector<TrackerSettings>& trackers = (plan_ ? plan_->tracking_settings() : none).trackers;
     for (const auto& [source, frame] : frames_)
-      if (Clock::now() - frame.seen < kPlaceHolds) add_places(trackers_, frame.sample, places);
+      if (Clock::now() - frame.seen < kPlaceHolds) add_places(trackers, frame.sample, places);
     outside.packets.assign(packets_.begin(), packets_.end());
   }
   for (const auto& [robot, place] : places) outside.robots.push_back(place);
@@ -254,8 +274,59 @@ std::string LiveRun::outside(std::int64_t tick) {
   return outside_text(tick, outside);
 }
 
+void LiveRun::on_metrics(const WireMetrics& metrics) {
+  const std::lock_guard lock(mutex_);
+  if (run_ == 0 || metrics.run != run_ || !plan_) return;
+  const auto now = Clock::now();
+  live_work_.take(metrics, now);
+  if (now < flights_until_ && metrics.publisher == plan_->radio().value()) {
+    live_flights_.take(metrics.observations._buffer, metrics.observations._length,
+                       metrics.first_tick + metrics.hash_parts._length, plan_->tick_length);
+  }
+}
+
+std::shared_ptr<const RunPlan> LiveRun::plan() {
+  const std::lock_guard lock(mutex_);
+  return plan_;
+}
+
+std::string LiveRun::flights(std::int64_t from, std::int64_t tick) {
+  const std::lock_guard lock(mutex_);
+  flights_until_ = Clock::now() + kFlightsWanted;
+  return live_flights_.text(from, tick);
+}
+
+std::string LiveRun::work() {
+  const std::lock_guard lock(mutex_);
+  return work_text(/*live=*/true, plan_ ? live_work_.recent(*plan_) : std::vector<FederateTime>());
+}
+
+std::string LiveRun::marks() {
+  const std::shared_ptr<RecordedRun> recorded = recording();
+  return recorded ? recorded->marks() : marks_text({}, /*whole=*/true);
+}
+
+/// Says why the run would ignore the request, where that is known here.
+std::string LiveRun::place(const Relocation& place) {
+  const std::shared_ptr<const RunPlan> known = plan();
+  if (const char* const why = known ? defect(place, *known) : nullptr)
+    return fmt::format("{} {} stays where it is: {}.", place.movable ? "Object" : "Robot", place.body, why);
+  PublicRelocation sample{};
+  client_.copy(sample.client, sizeof sample.client - 1);
+  sample.run = run_;
+  sample.request = ++request_;
+  sample.movable = place.movable;
+  sample.body = place.body;
+  sample.x_mm = place.pose.x_mm;
+  sample.y_mm = place.pose.y_mm;
+  sample.heading_rad = place.pose.heading_rad;
+  relocations_.write(sample);
+  return {};
+}
+
 std::string LiveRun::steer(const Request& request) {
   if (run_ == 0) return "The run has ended.";
+  if (request.kind == Request::Kind::kPlace) return place(request.place);
   if (request.kind == Request::Kind::kOverhead) {
     PublicOverheadPacket packet{};
     client_.copy(packet.client, sizeof packet.client - 1);

@@ -15,9 +15,11 @@
 #include <string>
 
 #include "clients/observe/observer.hpp"
+#include "clients/view/flights.hpp"
 #include "clients/view/frame_code.hpp"
 #include "clients/view/gateway.hpp"
 #include "clients/view/recorded_run.hpp"
+#include "clients/view/work.hpp"
 #include "core/federation/topics.hpp"
 
 namespace kilotwin::view {
@@ -44,6 +46,9 @@ class LiveRun : public Answers {
   [[nodiscard]] std::string plot(std::uint32_t number, std::optional<std::uint32_t> robot) override;
   [[nodiscard]] std::string program(std::uint32_t robot, std::int64_t tick) override;
   [[nodiscard]] std::string outside(std::int64_t tick) override;
+  [[nodiscard]] std::string flights(std::int64_t from, std::int64_t tick) override;
+  [[nodiscard]] std::string work() override;
+  [[nodiscard]] std::string marks() override;
   [[nodiscard]] std::string steer(const Request& request) override;
 
  private:
@@ -56,6 +61,9 @@ class LiveRun : public Answers {
   void follow_recording();
   void on_tracker_frame(const PublicTrackerFrame& frame);
   void on_packet(const PublicStationPacket& packet);
+  void on_metrics(const WireMetrics& metrics);
+  [[nodiscard]] std::shared_ptr<const RunPlan> plan();
+  [[nodiscard]] std::string place(const Relocation& place);
   [[nodiscard]] std::shared_ptr<RecordedRun> recording();
   void post_status(Gateway& gateway, bool ended);
 
@@ -66,18 +74,24 @@ class LiveRun : public Answers {
   dds::Participant participant_;
   dds::Writer<PublicRunControl> control_;
   dds::Writer<PublicOverheadPacket> overhead_;
+  dds::Writer<PublicRelocation> relocations_;
   std::atomic<std::uint64_t> run_{0};  // at hand; 0: none
   std::mutex mutex_;
   PublicRunStatus status_{};  // the newest, of any run; guarded by mutex_
   std::uint64_t status_number_ = 0;
-  std::shared_ptr<RecordedRun> recording_;   // of the run at hand; guarded by mutex_
-  Clock::time_point look_{};                 // when to look for new records
-  std::vector<TrackerSettings> trackers_;    // of the run at hand; guarded by mutex_, like the next two
+  std::shared_ptr<RecordedRun> recording_;  // of the run at hand; guarded by mutex_
+  Clock::time_point look_{};                // when to look for new records
+  std::shared_ptr<const RunPlan>
+      plan_;  // of the run at hand; nullptr: not known; guarded by mutex_, like what follows
   std::map<std::string, SeenFrame> frames_;  // the newest of each tracker
   std::deque<ShownPacket> packets_;          // the newest
+  LiveWork live_work_;
+  LiveFlights live_flights_;
+  Clock::time_point flights_until_{};  // until then messages are wanted
   dds::Reader<PublicRunStatus> statuses_;
   dds::Reader<PublicTrackerFrame> tracker_frames_;
   dds::Reader<PublicStationPacket> station_packets_;
+  dds::Reader<WireMetrics> metrics_;
 
   std::uint64_t posted_status_ = 0, ended_run_ = 0;
   PositionGrid grid_;

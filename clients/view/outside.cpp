@@ -8,10 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "core/base/pose.hpp"
-#include "idl/experiment.pb.h"
-#include "idl/recording.pb.h"
-#include "services/ark/tracking/measured_pose.hpp"
+#include "core/trackers/measured_pose.hpp"
 
 namespace kilotwin::view {
 namespace {
@@ -26,22 +23,12 @@ double rounded(double value) { return std::round(10 * value) / 10; }
 
 }  // namespace
 
-std::vector<TrackerSettings> trackers_of(const proto::Experiment& experiment) {
-  std::vector<TrackerSettings> trackers;
-  for (const proto::Tracker& tracker : experiment.tracker()) {
-    trackers.push_back({tracker.source(), tracker.x_mm(), tracker.y_mm(), tracker.heading_deg() * kPi / 180,
-                        tracker.scale(), tracker.mirrored(), tracker.first_robot(), tracker.position_sd_mm(),
-                        tracker.heading_sd_deg() * kPi / 180});
-  }
-  return trackers;
-}
-
 void add_places(const std::vector<TrackerSettings>& trackers, const TrackerSample& sample,
                 std::map<std::uint32_t, TrackedPlace>& to) {
   const TrackerSettings tracker = sample.source < trackers.size() ? trackers[sample.source] : TrackerSettings{};
   for (std::size_t n = 0; n < sample.robot.size(); ++n) {
     if (sample.state[n] == kLost) continue;
-    const ark::MeasuredPose pose = ark::measured_pose(tracker, sample, n);
+    const MeasuredPose pose = measured_pose(tracker, sample, n);
     if (pose.is_near())
       to.try_emplace(sample.robot[n],
                      TrackedPlace{sample.robot[n], pose.x_mm, pose.y_mm, pose.xx, pose.xy, pose.yy});

@@ -14,12 +14,7 @@
 #include "core/frames/tracker_sample.hpp"
 #include "core/plan/tracking_settings.hpp"
 
-namespace kilotwin {
-namespace proto {
-class Experiment;
-}
-
-namespace view {
+namespace kilotwin::view {
 
 inline constexpr std::size_t kMostPackets = 8, kMostAlarms = 20;  ///< that a viewer is told of
 
@@ -42,8 +37,6 @@ struct Outside {
   std::vector<std::string> alarms;   ///< lines of the residual monitor, oldest first
 };
 
-/// The experiment's trackers, with the places of their origins.
-[[nodiscard]] std::vector<TrackerSettings> trackers_of(const proto::Experiment&);
 /// The robots that a sample holds and that the tracker has not lost. Robots that are listed already stay as they are.
 void add_places(const std::vector<TrackerSettings>& trackers, const TrackerSample& sample,
                 std::map<std::uint32_t, TrackedPlace>& to);
@@ -55,5 +48,4 @@ void add_places(const std::vector<TrackerSettings>& trackers, const TrackerSampl
 /// A message of type "outside".
 [[nodiscard]] std::string outside_text(std::int64_t tick, const Outside&);
 
-}  // namespace view
-}  // namespace kilotwin
+}  // namespace kilotwin::view

@@ -7,6 +7,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "core/base/error.hpp"
 #include "core/base/ids.hpp"
 
 namespace kilotwin::view {
@@ -24,8 +25,11 @@ constexpr auto kAnswerHolds = 1s;
 constexpr std::size_t kMostAnswers = 64;
 /// Records of events that one answer reads at most.
 constexpr std::size_t kMostRecordsPerAnswer = 4000, kMostEventCounts = 8;
+/// Records of one variable that are taken between two states at most, the newest ones.
+constexpr std::size_t kMostValueRecords = 256;
 /// Variables and events reach the recording at most so many ticks after the newest one, and some more.
 constexpr std::int64_t kSettled_ticks = 128;
+constexpr std::int64_t kEver = std::numeric_limits<std::int64_t>::max();
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 
 struct EventPlot {
@@ -70,22 +74,36 @@ RecordedCurves::RecordedCurves(recorder::Reader& reader, const recorder::StateIn
       continue;
     const bool of_robot = static_cast<recorder::Observable>(i) == recorder::Observable::kDisplacement;
     plots_.push_back(
-        {std::string(info.name), std::string(info.title), std::string(info.unit), true, of_robot, {}, {}, i});
+        {std::string(info.name), std::string(info.title), std::string(info.unit), true, of_robot, {}, {}, {}, i});
   }
+  try {
+    auto own = std::make_unique<recorder::SwarmObservables>(header);
+    if (own->any()) own_ = std::move(own);
+  } catch (const UserError&) {
+    // A recording of another version may hold expressions that this one cannot read.
+  }
+  for (std::size_t i = 0; own_ && i < own_->names().size(); ++i) {
+    Plot& plot = plots_.emplace_back();
+    plot.name = own_->names()[i];
+    plot.title = fmt::format("{} (observable)", plot.name);
+    plot.own = i;
+  }
+  variables_taken_.assign(static_cast<std::size_t>(header.variable_size()), 0);
   constexpr std::array<std::array<const char*, 2>, kCounts> kCountNames{
       {{"running", "robots whose program runs"}, {"failed", "failed robots"}, {"lit", "robots with their LED on"}}};
   for (std::size_t i = 0; i < kCounts; ++i)
     plots_.push_back(
-        {kCountNames[i][0], kCountNames[i][1], "", true, false, {}, {}, recorder::kObservables.size() + i});
+        {kCountNames[i][0], kCountNames[i][1], "", true, false, {}, {}, {}, recorder::kObservables.size() + i});
   for (const EventPlot& event : kEventPlots) {
     const bool recorded =
         std::find(header.event().begin(), header.event().end(), event.kind) != header.event().end();
     if (recorded || event.kind == proto::FAILURE)
-      plots_.push_back({event.name, event.title, "", true, true, {}, static_cast<std::uint32_t>(event.kind), 0});
+      plots_.push_back(
+          {event.name, event.title, "", true, true, {}, static_cast<std::uint32_t>(event.kind), {}, 0});
   }
   for (int v = 0; v < header.variable_size(); ++v) {
     const std::string& name = header.variable(v).name();
-    plots_.push_back({name, name, "", true, true, static_cast<std::uint32_t>(v), {}, 0});
+    plots_.push_back({name, name, "", true, true, static_cast<std::uint32_t>(v), {}, {}, 0});
   }
 }
 
@@ -110,10 +128,12 @@ std::string RecordedCurves::plot(std::uint32_t number, std::optional<std::uint32
   const auto known = answers_.find(key);
   const auto now = Clock::now();
   if (known != answers_.end() &&
-      (known->second.states == index_.states().size() || now - known->second.made < kAnswerHolds))
+      ((known->second.states == index_.states().size() && known->second.ended == index_.ended()) ||
+       now - known->second.made < kAnswerHolds))
     return known->second.text;
   const Curves curves = plot.variable ? of_variable(*plot.variable, robot)
                         : plot.event  ? of_events(*plot.event, robot)
+                        : plot.own    ? of_own(*plot.own)
                         : robot       ? of_displacement(*robot)
                                       : of_states(plot);
   std::string text = fmt::format(
@@ -122,7 +142,7 @@ std::string RecordedCurves::plot(std::uint32_t number, std::optional<std::uint32
   for (std::size_t i = 0; i < curves.values.size(); ++i) text += (i > 0 ? "," : "") + numbers(curves.values[i]);
   text += "]}";
   if (answers_.size() >= kMostAnswers) answers_.clear();
-  if (curves.whole) answers_[key] = {text, index_.states().size(), now};
+  if (curves.whole) answers_[key] = {text, index_.states().size(), index_.ended(), now};
   return text;
 }
 
@@ -142,12 +162,13 @@ std::size_t RecordedCurves::stride(std::size_t entries, std::size_t entry_bytes)
   return stride;
 }
 
-template <class Known, class Take> bool RecordedCurves::each_new_state(Known& known, const Take& take) {
+template <class Known, class Take>
+bool RecordedCurves::each_new_state(Known& known, std::int64_t until_tick, const Take& take) {
   const std::vector<recorder::StateIndex::Entry>& all = index_.states();
   const std::size_t step = stride(all.size(), kStateBytesPerRobot * reader_.header().robots());
   std::erase_if(known, [step](const auto& state) { return state.first % step != 0; });
   const auto until = Clock::now() + kReadFor;
-  for (std::size_t i = 0; i < all.size(); i += step) {
+  for (std::size_t i = 0; i < all.size() && all[i].tick <= until_tick; i += step) {
     if (known.contains(i)) continue;
     const proto::Record* const record = record_at(all[i].offset);
     if (record != nullptr && record->has_state()) take(i, record->state());
@@ -157,7 +178,7 @@ template <class Known, class Take> bool RecordedCurves::each_new_state(Known& kn
 }
 
 bool RecordedCurves::take_states() {
-  return each_new_state(states_, [this](std::size_t number, const proto::StateRecord& state) {
+  return each_new_state(states_, kEver, [this](std::size_t number, const proto::StateRecord& state) {
     observer_.add(seconds(state.tick()), recorder::values(state.x_mm()), recorder::values(state.y_mm()),
                   recorder::values(state.heading_rad()), recorder::values(state.movable_x_mm()),
                   recorder::values(state.movable_y_mm()));
@@ -188,13 +209,60 @@ RecordedCurves::Curves RecordedCurves::of_states(const Plot& plot) {
   return curves;
 }
 
+/// Hands variables up to a tick to the observables. Ticks ascend from call to call.
+void RecordedCurves::take_variables_until(std::int64_t tick) {
+  for (std::size_t v = 0; v < variables_taken_.size(); ++v) {
+    const std::vector<recorder::StateIndex::Entry>& all = index_.variable(v);
+    const auto end = std::upper_bound(all.begin(), all.end(), tick,
+                                      [](std::int64_t wanted, const auto& entry) { return wanted < entry.tick; });
+    const auto until = static_cast<std::size_t>(end - all.begin());
+    std::size_t at = std::max(variables_taken_[v], until - std::min(until, kMostValueRecords));
+    for (; at < until; ++at) {
+      const proto::Record* const record = record_at(all[at].offset);
+      if (record != nullptr && record->has_variable()) own_->take(record->variable());
+    }
+    variables_taken_[v] = std::max(variables_taken_[v], until);
+  }
+}
+
+bool RecordedCurves::take_own() {
+  // What variables say of the last ticks may still come.
+  std::int64_t settled = index_.states().back().tick;
+  for (std::size_t v = 0; v < variables_taken_.size() && !index_.ended(); ++v) {
+    const std::vector<recorder::StateIndex::Entry>& all = index_.variable(v);
+    settled = std::min(settled, all.empty() ? -1 : all.back().tick - kSettled_ticks);
+  }
+  return each_new_state(own_values_, settled, [this](std::size_t number, const proto::StateRecord& read) {
+    const proto::StateRecord state = read;  // reading variables takes the reader's memory
+    take_variables_until(state.tick());
+    const double time_s = seconds(state.tick());
+    own_observer_.add(time_s, recorder::values(state.x_mm()), recorder::values(state.y_mm()),
+                      recorder::values(state.heading_rad()), recorder::values(state.movable_x_mm()),
+                      recorder::values(state.movable_y_mm()));
+    own_values_[number] = own_->values(time_s, state, own_observer_.curves());
+  });
+}
+
+RecordedCurves::Curves RecordedCurves::of_own(std::size_t number) {
+  Curves curves;
+  curves.whole = take_own();
+  curves.names = {"value"};
+  curves.values.resize(1);
+  for (const auto& [state, values] : own_values_) {
+    curves.time_s.push_back(seconds(index_.states()[state].tick));
+    curves.values[0].push_back(values[number]);
+  }
+  return curves;
+}
+
 RecordedCurves::Curves RecordedCurves::of_displacement(std::uint32_t robot) {
   if (places_.robot != robot) places_ = {robot, {}};
   Curves curves{{}, {"value"}, {{}}};
-  curves.whole = each_new_state(places_.at, [this, robot](std::size_t number, const proto::StateRecord& state) {
-    const auto i = static_cast<int>(robot);
-    places_.at[number] = {state.x_mm(i), state.y_mm(i)};
-  });
+  curves.whole =
+      each_new_state(places_.at, kEver, [this, robot](std::size_t number, const proto::StateRecord& state) {
+        const auto i = static_cast<int>(robot);
+        places_.at[number] = {state.x_mm(i), state.y_mm(i)};
+      });
   for (const auto& [number, place] : places_.at) {
     const std::array<double, 2>& first = places_.at.begin()->second;
     curves.time_s.push_back(seconds(index_.states()[number].tick));

@@ -1,7 +1,8 @@
 /// RecordedCurves: what the page can plot of a recording, as curves over time. A recording may still grow.
 ///
 /// A curve has kMostPoints points at most, and reads so much of the file at most that a viewer never waits for long. Where there
-/// are more states, it takes every second, fourth, eighth... of them.
+/// are more states, it takes every second, fourth, eighth... of them. The observables that the experiment names are evaluated for
+/// these states; of a recording that grows, those that use variables end some seconds before its last state.
 #pragma once
 
 #include <array>
@@ -9,6 +10,7 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,6 +18,7 @@
 #include "clients/recorder/observables.hpp"
 #include "clients/recorder/reader.hpp"
 #include "clients/recorder/state_index.hpp"
+#include "clients/recorder/swarm_observables.hpp"
 
 namespace kilotwin::view {
 
@@ -23,7 +26,8 @@ inline constexpr std::size_t kMostPoints = 1000;
 
 class RecordedCurves {
  public:
-  /// Both must outlive this object, and the caller calls it from one thread at a time.
+  /// Both must outlive this object, and the caller calls it from one thread at a time. An expression that cannot be read is left
+  /// out, with all others.
   RecordedCurves(recorder::Reader& reader, const recorder::StateIndex& index);
 
   /// A message of type "plots": what can be plotted, of the swarm and of single robots. Plots have numbers from 0.
@@ -43,6 +47,7 @@ class RecordedCurves {
     std::string name, title, unit;
     bool of_swarm = true, of_robot = false;
     std::optional<std::uint32_t> variable, event;  ///< else a number of the swarm per state
+    std::optional<std::size_t> own;                ///< an observable of the experiment
     std::size_t number = 0;                        ///< index of it
   };
   struct Curves {
@@ -54,6 +59,7 @@ class RecordedCurves {
   struct Answer {
     std::string text;
     std::size_t states = 0;  ///< that the recording had
+    bool ended = false;      ///< it had its end
     Clock::time_point made;
   };
   /// Of one kind, of the swarm or of a robot: the number of events up to each record that was read.
@@ -69,11 +75,15 @@ class RecordedCurves {
     std::map<std::size_t, std::array<double, 2>> at;  ///< by number of the state
   };
 
-  /// Calls take(number, state) for each state that a curve needs and that `known` does not hold; forgets the others that it holds.
-  /// False: it took too long, and another call continues.
-  template <class Known, class Take> [[nodiscard]] bool each_new_state(Known& known, const Take& take);
+  /// Calls take(number, state) for each state up to a tick that a curve needs and that `known` does not hold; forgets the others
+  /// that it holds. False: it took too long, and another call continues.
+  template <class Known, class Take>
+  [[nodiscard]] bool each_new_state(Known& known, std::int64_t until, const Take& take);
   [[nodiscard]] bool take_states();
+  [[nodiscard]] bool take_own();
+  void take_variables_until(std::int64_t tick);
   [[nodiscard]] Curves of_states(const Plot& plot);
+  [[nodiscard]] Curves of_own(std::size_t number);
   [[nodiscard]] Curves of_displacement(std::uint32_t robot);
   [[nodiscard]] Curves of_variable(std::uint32_t variable, std::optional<std::uint32_t> robot);
   [[nodiscard]] Curves of_events(std::uint32_t kind, std::optional<std::uint32_t> robot);
@@ -87,7 +97,11 @@ class RecordedCurves {
   std::vector<Plot> plots_;
   recorder::ObservableObserver observer_;                       // knows the first state
   std::map<std::size_t, std::array<double, kNumbers>> states_;  // by number of the state
-  RobotPlaces places_;                                          // of the robot that was asked for last
+  std::unique_ptr<recorder::SwarmObservables> own_;             // nullptr: the experiment names none
+  recorder::ObservableObserver own_observer_;
+  std::map<std::size_t, std::vector<double>> own_values_;  // by number of the state
+  std::vector<std::size_t> variables_taken_;               // per variable: entries of the index that own_ knows
+  RobotPlaces places_;                                     // of the robot that was asked for last
   std::map<std::pair<std::uint32_t, std::int64_t>, Answer> answers_;
   std::deque<EventCounts> event_counts_;
 };

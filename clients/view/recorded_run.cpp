@@ -6,9 +6,14 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "clients/recorder/summary.hpp"
 #include "clients/recorder/tracker_records.hpp"
+#include "clients/view/flights.hpp"
 #include "clients/view/robot_log.hpp"
+#include "clients/view/watched_plan.hpp"
+#include "clients/view/work.hpp"
 #include "core/base/error.hpp"
+#include "core/base/pose.hpp"
 #include "core/logs/robot_logs.hpp"
 #include "idl/manifest.pb.h"
 
@@ -23,6 +28,8 @@ constexpr std::size_t kTrailPoints = 400, kTrailBytes = 48'000'000, kStateBytesP
 /// A place that a tracker stated is shown for so long. Records that one answer reads at most.
 constexpr double kPlaceHolds_s = 1;
 constexpr std::size_t kMostSamples = 128;
+/// Inputs that one answer reads at most, and marks of a time line.
+constexpr std::size_t kMostInputs = 4000, kMostMarks = 500;
 /// Pairs of robots that are listed for one robot.
 constexpr std::size_t kMostPartners = 8;
 
@@ -42,6 +49,7 @@ proto::Experiment experiment_of(const proto::RecordingHeader& header) {
   *experiment.mutable_obstacle() = header.obstacle();
   *experiment.mutable_movable() = header.movable();
   *experiment.mutable_light() = header.light();
+  *experiment.mutable_recording()->mutable_event() = header.event();
   *experiment.mutable_station()->mutable_environment() = header.environment();
   for (const std::uint32_t count : header.group_robots()) experiment.add_robots()->set_count(count);
   return experiment;
@@ -90,6 +98,7 @@ RecordedRun::RecordedRun(const fs::path& run) : reader_(recording_of(run)), inde
     }
   }
   grid_ = grid_of(*experiment);
+  plan_ = plan_of(*experiment);
   experiment_ = std::move(experiment);
 }
 
@@ -109,6 +118,7 @@ std::string RecordedRun::text() const {
   outline.states = index_.states().size();
   outline.firmware = firmware_;
   outline.federated = federated_;
+  if (federated_ && plan_) outline.ghost_margin_mm = ghost_margin_mm(*plan_);
   return run_text(outline, *experiment_);
 }
 
@@ -274,7 +284,8 @@ std::vector<std::string> RecordedRun::alarms_until(std::int64_t tick) const {
 std::vector<TrackedPlace> RecordedRun::places_at(std::int64_t tick) {
   const std::vector<StateIndex::Entry>& all = index_.trackers();
   const auto shortly = static_cast<std::int64_t>(kPlaceHolds_s / reader_.tick_length().seconds());
-  const std::vector<TrackerSettings> trackers = trackers_of(*experiment_);
+  const TrackingSettings none;
+  const std::vector<TrackerSettings>& trackers = (plan_ ? plan_->tracking_settings() : none).trackers;
   std::map<std::uint32_t, TrackedPlace> places;
   auto at = std::upper_bound(all.begin(), all.end(), tick,
                              [](std::int64_t wanted, const auto& entry) { return wanted < entry.tick; });
@@ -324,6 +335,58 @@ std::vector<ShownPacket> RecordedRun::packets_until(std::int64_t tick) {
   }
   if (newest_first.size() > kMostPackets) newest_first.resize(kMostPackets);
   return {newest_first.rbegin(), newest_first.rend()};
+}
+
+std::string RecordedRun::flights(std::int64_t from, std::int64_t tick) {
+  const std::lock_guard lock(mutex_);
+  std::vector<Flight> flights;
+  std::size_t read = 0;
+  for (const proto::RecordedEvent kind : {proto::RECEIVED, proto::SENT}) {
+    const std::vector<StateIndex::Entry>& all = index_.events(kind);
+    // An event's record is of the tick in which the packet ended.
+    auto at = std::upper_bound(all.begin(), all.end(), tick,
+                               [](std::int64_t wanted, const auto& entry) { return wanted < entry.tick; });
+    for (; at != all.begin() && flights.size() < kMostFlights && read < kMostSamples; ++read) {
+      if ((--at)->tick < from) break;
+      const proto::Record* const record = record_at(at->offset);
+      if (record != nullptr && record->has_event()) add_flights(record->event(), reader_.tick_length(), flights);
+    }
+  }
+  std::erase_if(flights, [from, tick](const Flight& flight) {
+    return !(flight.tick > static_cast<double>(from) && flight.tick <= static_cast<double>(tick));
+  });
+  const bool whole = flights.size() <= kMostFlights && read < kMostSamples;
+  if (flights.size() > kMostFlights) flights.resize(kMostFlights);
+  return flights_text({from, tick, static_cast<double>(tick), whole}, flights);
+}
+
+std::string RecordedRun::work() {
+  const std::lock_guard lock(mutex_);
+  const fs::path summary = logs_of_ / "summary.json";
+  if (work_.empty() && !logs_of_.empty() && fs::exists(summary)) {
+    try {
+      work_ = work_text(recorder::read_summary(summary));
+    } catch (const UserError&) {
+      // It is being written, or is none.
+    }
+  }
+  return work_.empty() ? work_text(/*live=*/false, {}) : work_;
+}
+
+std::string RecordedRun::marks() {
+  const std::lock_guard lock(mutex_);
+  const std::vector<StateIndex::Entry>& inputs = index_.inputs();
+  for (std::size_t read = 0; inputs_read_ < inputs.size() && read < kMostInputs; ++read) {
+    const proto::Record* const record = record_at(inputs[inputs_read_++].offset);
+    if (record == nullptr || !record->has_input() || record->input().kind() != proto::InputRecord::RELOCATION)
+      continue;
+    const proto::InputRecord& input = record->input();
+    if (marks_.size() == kMostMarks) continue;
+    marks_.push_back({input.tick(), fmt::format("{} {} placed at {:.0f}, {:.0f} mm, heading {:.0f}\u00b0",
+                                                input.movable() ? "object" : "robot", input.robot(), input.x_mm(),
+                                                input.y_mm(), input.heading_rad() * 180 / kPi)});
+  }
+  return marks_text(marks_, inputs_read_ == inputs.size());
 }
 
 std::string RecordedRun::steer(const Request&) { return "A recorded run cannot be steered."; }

@@ -13,6 +13,7 @@
 #include "clients/view/outside.hpp"
 #include "clients/view/recorded_curves.hpp"
 #include "clients/view/run_text.hpp"
+#include "core/plan/plan.hpp"
 
 namespace kilotwin::view {
 
@@ -43,6 +44,9 @@ class RecordedRun : public Answers {
   [[nodiscard]] std::string plot(std::uint32_t number, std::optional<std::uint32_t> robot) override;
   [[nodiscard]] std::string program(std::uint32_t robot, std::int64_t tick) override;
   [[nodiscard]] std::string outside(std::int64_t tick) override;
+  [[nodiscard]] std::string flights(std::int64_t from, std::int64_t tick) override;
+  [[nodiscard]] std::string work() override;
+  [[nodiscard]] std::string marks() override;
   [[nodiscard]] std::string steer(const Request&) override;
 
  private:
@@ -57,6 +61,10 @@ class RecordedRun : public Answers {
   RecordedCurves curves_{reader_, index_};
   std::filesystem::path logs_of_;  // the run directory; empty: the recording stands alone
   std::unique_ptr<const proto::Experiment> experiment_;
+  std::shared_ptr<const RunPlan> plan_;  // nullptr: the recording does not say enough
+  std::vector<Mark> marks_;              // of the inputs that were read
+  std::size_t inputs_read_ = 0;
+  std::string work_;  // the answer, once the run has ended
   std::vector<bool> firmware_;
   bool federated_ = false;
   PositionGrid grid_;

@@ -1,11 +1,13 @@
 #include "clients/view/request.hpp"
 
 #include <array>
+#include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "clients/view/outside.hpp"
+#include "core/base/pose.hpp"
 
 namespace kilotwin::view {
 namespace {
@@ -13,7 +15,7 @@ namespace {
 using nlohmann::json;
 using Kind = Request::Kind;
 
-constexpr std::array<std::pair<std::string_view, Kind>, 14> kKinds{{{"hello", Kind::kHello},
+constexpr std::array<std::pair<std::string_view, Kind>, 18> kKinds{{{"hello", Kind::kHello},
                                                                     {"next", Kind::kNext},
                                                                     {"at", Kind::kAt},
                                                                     {"trail", Kind::kTrail},
@@ -22,11 +24,15 @@ constexpr std::array<std::pair<std::string_view, Kind>, 14> kKinds{{{"hello", Ki
                                                                     {"plot", Kind::kPlot},
                                                                     {"program", Kind::kProgram},
                                                                     {"outside", Kind::kOutside},
+                                                                    {"flights", Kind::kFlights},
+                                                                    {"work", Kind::kWork},
+                                                                    {"marks", Kind::kMarks},
                                                                     {"overhead", Kind::kOverhead},
                                                                     {"pause", Kind::kPause},
                                                                     {"continue", Kind::kContinue},
                                                                     {"step", Kind::kStep},
-                                                                    {"stop", Kind::kStop}}};
+                                                                    {"stop", Kind::kStop},
+                                                                    {"place", Kind::kPlace}}};
 
 /// A whole number of the object, at least `lowest`; nothing where it is absent or another value.
 template <class Whole> std::optional<Whole> whole(const json& object, const char* key, std::int64_t lowest) {
@@ -60,6 +66,24 @@ bool take_packet(const json& object, OverheadPacket& packet) {
          packet.command == OverheadCommand::kOnce;
 }
 
+/// A finite number that the request must have.
+bool take_number(const json& object, const char* key, double& to) {
+  const auto found = object.find(key);
+  if (found == object.end() || !found->is_number()) return false;
+  to = found->get<double>();
+  return std::isfinite(to);
+}
+
+bool take_place(const json& object, Relocation& place) {
+  place.movable = object.contains("movable");
+  if (!take(object, place.movable ? "movable" : "robot", 0, place.body) ||
+      !take_number(object, "x", place.pose.x_mm) || !take_number(object, "y", place.pose.y_mm) ||
+      !take_number(object, "heading", place.pose.heading_rad))
+    return false;
+  place.pose.heading_rad = wrapped(std::remainder(place.pose.heading_rad, 2 * kPi));
+  return true;
+}
+
 bool take_fields(const json& object, Request& request) {
   switch (request.kind) {
     case Kind::kHello: {
@@ -71,6 +95,8 @@ bool take_fields(const json& object, Request& request) {
     case Kind::kAt: return take(object, "tick", 0, request.tick) && take(object, "request", 1, request.number);
     case Kind::kTrail: return take(object, "tick", 0, request.tick) && take(object, "robot", 0, request.robot);
     case Kind::kOutside: return take(object, "tick", 0, request.tick);
+    case Kind::kFlights: return take(object, "from", -1, request.from) && take(object, "tick", 0, request.tick);
+    case Kind::kPlace: return take_place(object, request.place);
     case Kind::kOverhead: return take_packet(object, request.packet);
     case Kind::kProgram: return take(object, "tick", 0, request.tick) && take(object, "robot", 0, request.robot);
     case Kind::kPlot:

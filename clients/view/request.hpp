@@ -9,8 +9,12 @@
 ///   {"do": "plot", "plot": P, "robot": R}    a curve over time, of a robot, or without R of the swarm
 ///   {"do": "program", "robot": R, "tick": T} variables and log of a robot's program up to tick T
 ///   {"do": "outside", "tick": T}         what trackers saw, and packets for the overhead controller, up to tick T
+///   {"do": "flights", "from": T, "tick": T}  messages that ended after the first tick, up to the second
+///   {"do": "work"}                       where the time of the federates goes
+///   {"do": "marks"}                      marks of the time line
 ///   {"do": "pause"} {"do": "continue"} {"do": "step", "steps": N} {"do": "stop"}
 ///   {"do": "overhead", "command": C, "message": "20 hexadecimal digits"}    a packet for the overhead controller
+///   {"do": "place", "robot": R, "x": X, "y": Y, "heading": H}    places a robot, mm and rad; "movable" in place of "robot": a body
 #pragma once
 
 #include <cstddef>
@@ -19,6 +23,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/frames/frames.hpp"
 #include "core/frames/overhead_packet.hpp"
 
 namespace kilotwin::view {
@@ -37,20 +42,26 @@ struct Request {
     kPlot,
     kProgram,
     kOutside,
+    kFlights,
+    kWork,
+    kMarks,
     kPause,
     kContinue,
     kStep,
     kStop,
-    kOverhead
+    kOverhead,
+    kPlace
   };
   Kind kind = Kind::kNext;
   std::string token;         ///< with kHello
-  std::int64_t tick = 0;     ///< with kAt, kTrail, kProgram and kOutside
+  std::int64_t tick = 0;     ///< with kAt, kTrail, kProgram, kOutside and kFlights
+  std::int64_t from = 0;     ///< with kFlights
   std::uint32_t number = 0;  ///< with kAt and kPlot
   std::uint32_t robot = 0;   ///< with kTrail, kRobot, kProgram, and kPlot if `of_robot`
   bool of_robot = false;     ///< with kPlot
   std::uint32_t steps = 1;   ///< with kStep
   OverheadPacket packet;     ///< with kOverhead
+  Relocation place;          ///< with kPlace; its heading is in [-pi, pi)
 
   [[nodiscard]] bool steers() const { return kind >= Kind::kPause; }
 };

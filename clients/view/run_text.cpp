@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -81,6 +82,11 @@ json partitions_of(const RunOutline& outline, const proto::Experiment& experimen
   return {experiment.deployment().partition_columns(), experiment.deployment().partition_rows()};
 }
 
+bool records(const proto::Experiment& experiment, proto::RecordedEvent kind) {
+  const auto& kinds = experiment.recording().event();
+  return std::find(kinds.begin(), kinds.end(), kind) != kinds.end();
+}
+
 /// Lamps that stand still.
 json lamps_of(const proto::Experiment& experiment) {
   json list = json::array();
@@ -149,6 +155,9 @@ std::string run_text(const RunOutline& outline, const proto::Experiment& experim
                   {"lamps", lamps_of(experiment)},
                   {"circles", circles_of(experiment)},
                   {"partitions", partitions_of(outline, experiment)},
+                  {"ghostMargin", outline.ghost_margin_mm},
+                  {"sentRecorded", records(experiment, proto::SENT)},
+                  {"receivedRecorded", records(experiment, proto::RECEIVED)},
                   {"groups", groups_of(outline, experiment)}});
 }
 
@@ -177,6 +186,12 @@ std::string program_text(const ProgramText& program) {
                   {"known", program.known},
                   {"variables", variables},
                   {"log", program.log}});
+}
+
+std::string marks_text(const std::vector<Mark>& marks, bool whole) {
+  json list = json::array();
+  for (const Mark& mark : marks) list.push_back({{"tick", mark.tick}, {"text", mark.text}});
+  return text_of({{"type", "marks"}, {"whole", whole}, {"marks", list}});
 }
 
 std::string notice_text(const std::string& line) { return text_of({{"type", "notice"}, {"text", line}}); }

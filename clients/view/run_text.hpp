@@ -27,6 +27,7 @@ struct RunOutline {
   std::uint32_t robots = 0;
   std::size_t states = 0;      ///< of a recording
   bool federated = false;      ///< the arena is divided into the partitions of the experiment
+  double ghost_margin_mm = 0;  ///< of its partitions
   std::vector<bool> firmware;  ///< per group: runs on the simulated processor; may be shorter
 };
 
@@ -48,6 +49,13 @@ struct ProgramText {
 };
 /// A message of type "program".
 [[nodiscard]] std::string program_text(const ProgramText&);
+/// An input of a recorded run that is marked on the time line.
+struct Mark {
+  std::int64_t tick = 0;
+  std::string text;  ///< one line
+};
+/// A message of type "marks". `whole`: false: there are more, if it is asked for again.
+[[nodiscard]] std::string marks_text(const std::vector<Mark>& marks, bool whole);
 /// A message of type "notice": one line for whoever looks.
 [[nodiscard]] std::string notice_text(const std::string& line);
 

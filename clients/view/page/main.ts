@@ -1,21 +1,29 @@
 // The page: one run, live or recorded, from above. It draws when something has changed.
 import { Camera } from "./camera.ts";
 import { Connection } from "./connection.ts";
+import { Flights, FLOATS } from "./flights.ts";
 import { Labels } from "./labels.ts";
+import { showMarks } from "./marks.ts";
+import { Mover } from "./mover.ts";
 import { element, notice, setText, showConnection, showFrame, showProgram, showRobot, showRun, showScale } from "./panels.ts";
+import { HandOvers } from "./partitions.ts";
 import { Playback } from "./playback.ts";
 import { ellipsesOf, messageOf, showAlarms, showPackets } from "./outside.ts";
 import { Plots } from "./plots.ts";
 import { listenToPointer } from "./pointer.ts";
-import { kindsOf, lifeOf, LIFE_ABSENT, type Frame, type Message, type OutsideText, type RobotCounts, type Run, type Status } from "./protocol.ts";
+import { kindsOf, lifeOf, LIFE_ABSENT, type Frame, type MarksText, type Message, type OutsideText, type RobotCounts, type Run, type Status, type WorkText } from "./protocol.ts";
 import { Renderer, type Marks } from "./renderer.ts";
 import { svgOf } from "./svg.ts";
 import { Theme } from "./theme.ts";
+import { showWork } from "./work.ts";
 
 const PANEL_EVERY_MS = 200;
 /** How often the selected robot's variables and log are asked for while time passes. */
 const PROGRAM_EVERY_MS = 400;
 const OUTSIDE_EVERY_MS = 250;
+const WORK_EVERY_MS = 1000;
+/** Marks are asked for again while not all have come, and while the recording grows. */
+const MARKS_EVERY_MS = 1000;
 const TRAIL_EVERY_S = 1;
 const TRAIL_SEGMENTS = 30;
 /** Swarms larger than this begin without trails. */
@@ -39,6 +47,15 @@ class Page {
   });
   readonly #theme = new Theme(() => this.#recolour());
   readonly #playback = new Playback((request) => this.#connection.send(request));
+  readonly #flights = new Flights((request) => this.#connection.send(request));
+  readonly #handOvers = new HandOvers();
+  readonly #mover: Mover = new Mover({
+    send: (request) => this.#connection.send(request),
+    notice,
+    placeOf: (robot) => this.#placeOf(robot),
+    mayMove: () => this.#maySend,
+    paused: () => this.#paused,
+  }, this.#camera);
   readonly #connection: Connection;
 
   #run: Run | undefined;
@@ -50,6 +67,11 @@ class Page {
   #outside: OutsideText | undefined;
   #ellipses: [number, number][][] = [];
   #outsideAsked: { tick: number; at: number } | undefined;
+  #work: WorkText | undefined;
+  #workAsked = -Infinity;
+  #timeMarks: MarksText["marks"] = [];
+  #marksDue = true;
+  #marksAsked = -Infinity;
   #mayTrail = 0; // when the trail of the selected robot may be asked for again
   #trails = true;
   #trailFrom: Frame | undefined;
@@ -61,7 +83,7 @@ class Page {
   #bytes: { at: number; bytes: number }[] = [];
   #pace: { at: number; tick: number }[] = [];
   /** What tests measure. */
-  readonly counters = { drawn: 0, received: 0, bytes: 0, drawMs: 0 };
+  readonly counters = { drawn: 0, received: 0, bytes: 0, drawMs: 0, flights: 0, handOvers: 0, held: "" };
 
   constructor() {
     this.#listen();
@@ -94,6 +116,8 @@ class Page {
     this.#playback.lost();
     this.#plots.lost();
     this.#program = this.#outsideAsked = undefined;
+    this.#flights.forget();
+    this.#mover.refused();
   }
 
   #message(message: Message): void {
@@ -109,6 +133,15 @@ class Page {
         this.#ellipses = ellipsesOf(message);
         showAlarms(message.alarms);
         return showPackets(message, this.#maySend);
+      case "flights": return this.#flights.take(message);
+      case "work":
+        this.#work = message;
+        return showWork(message);
+      case "marks":
+        this.#timeMarks = message.marks;
+        this.#marksDue = !message.whole;
+        if (this.#run) showMarks(this.#timeMarks, this.#run, (tick) => this.#seek(tick));
+        return;
       case "plots": return this.#plots.list(message.plots);
       case "plot": return this.#plots.take(message);
       case "program":
@@ -120,7 +153,9 @@ class Page {
           this.#run.lastTick = message.lastTick;
           this.#run.states = message.states;
           this.#line.max = String(message.lastTick);
+          showMarks(this.#timeMarks, this.#run, (tick) => this.#seek(tick));
         }
+        this.#marksDue = true;
         return;
       case "floors": return this.#renderer.setFloors(message.floors);
       case "trail":
@@ -135,7 +170,9 @@ class Page {
       case "grant":
         this.#maySteer = message.steer;
         return this.#buttons();
-      case "notice": return notice(message.text);
+      case "notice":
+        this.#mover.refused();
+        return notice(message.text);
     }
   }
 
@@ -149,7 +186,18 @@ class Page {
     if (another) {
       this.#fitted = true;
       this.#showTrails(run.robots <= MOST_TRAILS);
+      this.#showMessages((run.receivedRecorded || run.sentRecorded) && run.robots <= MOST_TRAILS);
     }
+    this.#flights.begin(run);
+    this.#handOvers.begin(run);
+    this.#mover.begin(run);
+    this.#useMover(false);
+    this.#work = undefined;
+    this.#workAsked = this.#marksAsked = -Infinity;
+    this.#timeMarks = [];
+    this.#marksDue = true;
+    showWork(undefined);
+    showMarks([], run, () => undefined);
     this.#line.min = String(run.firstTick);
     this.#line.max = String(run.lastTick);
     this.#playback.begin(run);
@@ -172,6 +220,7 @@ class Page {
     this.#bytes.push({ at: performance.now(), bytes: frame.bytes });
     this.#playback.take(frame);
     this.#plots.frame(frame, performance.now());
+    this.#flights.frame(frame);
     this.#stale = true;
   }
 
@@ -187,6 +236,8 @@ class Page {
       this.#camera.resize(main.clientWidth, main.clientHeight);
       this.#stale = true;
     }
+    if (this.#mover.update(now) || this.#handOvers.active) this.#stale = true;
+    this.#flights.update(this.#playback, now);
     if (this.#stale) this.#draw();
     if (now - this.#panelsAt > PANEL_EVERY_MS) {
       this.#panelsAt = now;
@@ -203,7 +254,9 @@ class Page {
     if (frame && (frame !== this.#shown || part > 0 || this.#playback.playing)) this.#renderer.setFrame(frame, next, part);
     if (frame && frame !== this.#shown) {
       this.#follow(frame);
+      this.#handOvers.take(frame, began);
       this.#shown = frame;
+      this.#mover.frame(frame);
     }
     const selected = frame && this.#selected !== undefined ? this.#placeOf(this.#selected) : undefined;
     if (selected && element<HTMLInputElement>("follow").checked) {
@@ -220,7 +273,14 @@ class Page {
   #marks(selected: [number, number] | undefined): Marks {
     const trail = selected && this.#trail.length > 0 ? [...this.#trail, selected] : [];
     const range = element<HTMLInputElement>("range").checked ? (this.#run?.radioRange ?? 0) : 0;
-    return { selected, trail, range, ellipses: this.#ellipses };
+    const place = (robot: number): [number, number] => this.#placeOf(robot);
+    const flying = this.#playback.current ? this.#flights.fill(this.#playback, place, this.#selected) : 0;
+    const flights = this.#flights.data.subarray(0, FLOATS * flying);
+    const flashes = this.#playback.current ? this.#handOvers.flashes(performance.now(), place) : [];
+    this.counters.flights += flying;
+    this.counters.handOvers = this.#handOvers.count;
+    this.counters.held = this.#mover.held ? `${this.#mover.held.movable ? "object" : "robot"} ${this.#mover.held.body}${this.#mover.waiting ? " waits" : ""}` : "";
+    return { selected, trail, range, ellipses: this.#ellipses, flights, flashes, held: this.#mover.lines() };
   }
 
   /** Where a robot is drawn, mm. */
@@ -274,12 +334,25 @@ class Page {
     this.#connection.send({ do: "outside", tick });
   }
 
+  #askWork(now: number): void {
+    const settled = !this.#playback.live && this.#work !== undefined && (this.#work.federates.length > 0 || this.#work.cost.length > 0);
+    if (settled || now - this.#workAsked < WORK_EVERY_MS) return;
+    this.#workAsked = now;
+    this.#connection.send({ do: "work" });
+  }
+
+  #askMarks(now: number): void {
+    if (this.#playback.live || !this.#marksDue || now - this.#marksAsked < MARKS_EVERY_MS) return;
+    this.#marksAsked = now;
+    this.#connection.send({ do: "marks" });
+  }
+
   #panels(now: number): void {
     const run = this.#run;
     const frame = this.#playback.current;
     if (!run) return;
     this.#bytes = this.#bytes.filter((entry) => now - entry.at < 2000);
-    showRun(run, this.#status, this.#bytes.reduce((sum, entry) => sum + entry.bytes, 0) / 2);
+    showRun(run, this.#status, this.#bytes.reduce((sum, entry) => sum + entry.bytes, 0) / 2, this.#handOvers.count);
     if (!frame) return;
     const time = this.#playback.playing ? this.#playback.time : frame.tick;
     this.#pace.push({ at: now, tick: time });
@@ -296,6 +369,8 @@ class Page {
       this.#askProgram(this.#selected, Math.floor(time), now);
     }
     this.#askOutside(Math.floor(time), now);
+    this.#askWork(now);
+    this.#askMarks(now);
     this.#plots.update(now, time * run.tickSeconds);
     this.#buttons();
   }
@@ -331,6 +406,9 @@ class Page {
     play.disabled = !steers;
     element<HTMLButtonElement>("forward").disabled = !steers || (live && phase !== "paused");
     element("stop").hidden = !live || !steers;
+    element("move").hidden = !live;
+    element<HTMLButtonElement>("move").disabled = !this.#maySend;
+    if (this.#mover.on && !this.#maySend) this.#useMover(false);
     if (element("overhead-form").hidden === this.#maySend) showPackets(this.#outside, this.#maySend);
     const badge = element("phase");
     badge.hidden = !this.#run;
@@ -417,6 +495,43 @@ class Page {
     this.#stale = true;
   }
 
+  #showMessages(show: boolean): void {
+    this.#flights.shown = show;
+    element("messages").setAttribute("aria-pressed", String(show));
+    this.#stale = true;
+  }
+
+  #toggleMessages(): void {
+    if (!this.#flights.recorded) {
+      notice("No messages are recorded. The experiment's recording { event: RECEIVED } records them.");
+      return;
+    }
+    this.#showMessages(!this.#flights.shown);
+  }
+
+  /** Chooses or leaves the tool that moves robots and objects. */
+  #useMover(use: boolean): void {
+    if (use && !this.#maySend) {
+      notice("Moving needs a run that goes on, and the whole address that `kilotwin view` has printed.");
+      use = false;
+    }
+    this.#mover.on = use;
+    if (!use) this.#mover.release();
+    element("move").setAttribute("aria-pressed", String(use));
+    this.#picture.classList.toggle("moves", use);
+    if (use && this.#selected !== undefined && this.#playback.current) this.#mover.takeRobot(this.#selected, this.#playback.current);
+    this.#stale = true;
+  }
+
+  /** Moves or turns the selected robot, or the object in hand. False: there is none. */
+  #nudge(right: number, up: number, turns: number): boolean {
+    const frame = this.#playback.current;
+    if (!this.#mover.on || !frame) return false;
+    if (!this.#mover.held && (this.#selected === undefined || !this.#mover.takeRobot(this.#selected, frame))) return false;
+    this.#mover.nudge(right, up, turns);
+    return true;
+  }
+
   #toggleHelp(show?: boolean): void {
     const panel = element("help-panel");
     panel.hidden = show === undefined ? !panel.hidden : !show;
@@ -469,6 +584,8 @@ class Page {
     on("zoom-out", () => this.#zoom(1 / 1.4));
     on("fit", () => this.#fit());
     on("trails", () => this.#showTrails(!this.#trails));
+    on("messages", () => this.#toggleMessages());
+    on("move", () => this.#useMover(!this.#mover.on));
     on("plots-button", () => this.#plots.toggle());
     on("save", () => this.#save());
     on("save-svg", () => this.#saveSvg());
@@ -496,6 +613,19 @@ class Page {
       },
       dragged: () => (element<HTMLInputElement>("follow").checked = false),
       clicked: (px, py) => this.#clicked(px, py),
+      takes: (px, py, withShift) => {
+        const frame = this.#playback.current;
+        this.#stale = true;
+        return (this.#mover.on || withShift) && frame !== undefined && this.#mover.take(px, py, frame);
+      },
+      carried: (px, py) => {
+        this.#mover.drag(px, py);
+        this.#stale = true;
+      },
+      dropped: (moved) => {
+        this.#mover.drop(moved);
+        this.#stale = true;
+      },
     });
     window.addEventListener("keydown", (event) => this.#key(event));
   }
@@ -506,7 +636,7 @@ class Page {
     if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
     const run = this.#run;
     const jump = run ? SEEK_S / run.tickSeconds : 0;
-    const keys: Record<string, () => void> = {
+    const keys: Record<string, () => unknown> = {
       ".": () => this.#step(1),
       ",": () => this.#step(-1),
       "+": () => this.#zoom(1.4),
@@ -515,6 +645,10 @@ class Page {
       "0": () => this.#fit(),
       p: () => this.#plots.toggle(),
       t: () => this.#showTrails(!this.#trails),
+      m: () => this.#toggleMessages(),
+      g: () => this.#useMover(!this.#mover.on),
+      "[": () => this.#nudge(0, 0, 1),
+      "]": () => this.#nudge(0, 0, -1),
       d: () => this.#theme.toggle(),
       s: () => this.#save(),
       v: () => this.#saveSvg(),
@@ -522,14 +656,17 @@ class Page {
       "?": () => this.#toggleHelp(),
       Escape: () => {
         this.#toggleHelp(false);
-        this.#select(undefined);
+        if (this.#mover.held || this.#mover.on) this.#useMover(false);
+        else this.#select(undefined);
       },
     };
     // These belong to the control that has the focus.
     if (!onControl || event.target === this.#line) keys[" "] = () => this.#playOrPause();
     if (!onControl) {
-      keys["ArrowLeft"] = () => this.#seek(this.#playback.time - jump);
-      keys["ArrowRight"] = () => this.#seek(this.#playback.time + jump);
+      keys["ArrowLeft"] = () => this.#nudge(-1, 0, 0) || this.#seek(this.#playback.time - jump);
+      keys["ArrowRight"] = () => this.#nudge(1, 0, 0) || this.#seek(this.#playback.time + jump);
+      keys["ArrowUp"] = () => this.#nudge(0, 1, 0);
+      keys["ArrowDown"] = () => this.#nudge(0, -1, 0);
     }
     const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!act) return;

@@ -1,5 +1,6 @@
 // Text of the page: head line, facts, the selected robot. All text from a run enters as text, never as HTML.
 import { GRID_PX, roundStep } from "./geometry.ts";
+import { cellOf, isGhost } from "./partitions.ts";
 import {
   groupOf, headingOf, ledOf, leftMotorOn, lifeName, lifeOf, rightMotorOn, LIFE_FAILED,
   type Frame, type ProgramText, type RobotCounts, type Run, type Status,
@@ -39,7 +40,7 @@ const fileName = (path: string): string => path.split("/").pop() ?? "";
 const list = (entries: { robot: number; count: number }[]): string =>
   entries.length === 0 ? "none" : entries.map((entry) => `${entry.robot} (${entry.count})`).join(", ");
 
-export function showRun(run: Run, status: Status | undefined, bytesPerSecond: number): void {
+export function showRun(run: Run, status: Status | undefined, bytesPerSecond: number, handOvers: number): void {
   setText("name", run.name);
   document.title = `${run.name} – Kilotwin`;
   const { radius, corners, halfWidth, halfHeight } = run.arena;
@@ -51,7 +52,8 @@ export function showRun(run: Run, status: Status | undefined, bytesPerSecond: nu
     ["tick", `${(1000 * run.tickSeconds).toFixed(3)} ms`],
     ["radio range", `${run.radioRange.toFixed(0)} mm`],
   ];
-  if (run.partitions[0] * run.partitions[1] > 1) facts.push(["partitions", run.partitions.join(" × ")]);
+  if (run.partitions[0] * run.partitions[1] > 1) 
+    facts.push(["partitions", run.partitions.join(" × ")], ["margin of ghosts", `${run.ghostMargin.toFixed(0)} mm`], ["hand-overs seen", String(handOvers)]);
   if (run.source === "recorded") facts.push(["states", String(run.states)]);
   if (status) {
     facts.push(["messages sent", String(status.sent)], ["received", String(status.received)]);
@@ -78,12 +80,9 @@ export function showFrame(run: Run, frame: Frame, tick: number, speed: number | 
 
 /** Column and row of the partition in which a robot stands; undefined where there is one partition. */
 function partitionOf(run: Run, frame: Frame, robot: number): string | undefined {
-  const [columns, rows] = run.partitions;
-  if (columns * rows <= 1) return undefined;
-  const { halfWidth, halfHeight } = run.arena;
-  const cell = (value: number, half: number, count: number): number =>
-    Math.min(count - 1, Math.max(0, Math.floor(((run.gridLowest + run.gridStep * value + half) / (2 * half)) * count)));
-  return `${cell(frame.x[robot]!, halfWidth, columns)}, ${cell(frame.y[robot]!, halfHeight, rows)}`;
+  if (run.partitions[0] * run.partitions[1] <= 1) return undefined;
+  const [x, y] = [run.gridLowest + run.gridStep * frame.x[robot]!, run.gridLowest + run.gridStep * frame.y[robot]!];
+  return `${cellOf(run, x, y).join(", ")}${isGhost(run, x, y) ? ", known to its neighbour" : ""}`;
 }
 
 export function showRobot(run: Run, frame: Frame, robot: number, counts: RobotCounts | undefined): void {
@@ -95,7 +94,7 @@ export function showRobot(run: Run, frame: Frame, robot: number, counts: RobotCo
   const group = groupOf(run, robot);
   const facts: Fact[] = [
     ["x, y", `${(run.gridLowest + run.gridStep * frame.x[robot]!).toFixed(1)}, ${(run.gridLowest + run.gridStep * frame.y[robot]!).toFixed(1)} mm`],
-    ["heading", `${((headingOf(value) * 180) / Math.PI).toFixed(0)}°`],
+    ["heading", `${Math.round((headingOf(value) * 180) / Math.PI) % 360}°`],
     ["LED (r g b)", ledOf(value).join(" ")],
     ["state", lifeName(lifeOf(state))],
   ];

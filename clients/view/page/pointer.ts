@@ -7,11 +7,16 @@ export interface PointerListener {
   moved(): void;
   dragged(): void;
   clicked(px: number, py: number): void;
+  /** Whether the pointer takes something, which then moves in place of the picture. */
+  takes(px: number, py: number, withShift: boolean): boolean;
+  carried(px: number, py: number): void;
+  dropped(moved: boolean): void;
 }
 
 export function listenToPointer(canvas: HTMLCanvasElement, camera: Camera, listener: PointerListener): void {
   const down = new Map<number, [number, number]>();
   let travelled = 0;
+  let carries = false;
 
   const place = (event: MouseEvent): [number, number] => {
     const box = canvas.getBoundingClientRect();
@@ -33,6 +38,7 @@ export function listenToPointer(canvas: HTMLCanvasElement, camera: Camera, liste
     canvas.setPointerCapture(event.pointerId);
     if (down.size === 0) travelled = 0;
     down.set(event.pointerId, place(event));
+    if (down.size === 1 && event.button === 0) carries = listener.takes(...place(event), event.shiftKey);
   });
 
   canvas.addEventListener("pointermove", (event) => {
@@ -42,6 +48,10 @@ export function listenToPointer(canvas: HTMLCanvasElement, camera: Camera, liste
     const before = spread();
     down.set(event.pointerId, to);
     travelled += Math.hypot(to[0] - from[0], to[1] - from[1]);
+    if (carries) {
+      if (travelled > CLICK_PX) listener.carried(...to);
+      return;
+    }
     if (down.size === 2 && before > 0) camera.zoomAt(...to, spread() / before);
     else if (travelled > CLICK_PX) {
       camera.pan(to[0] - from[0], to[1] - from[1]);
@@ -54,6 +64,11 @@ export function listenToPointer(canvas: HTMLCanvasElement, camera: Camera, liste
   const up = (event: PointerEvent): void => {
     if (!down.delete(event.pointerId)) return;
     canvas.classList.remove("dragging");
+    if (carries) {
+      carries = false;
+      listener.dropped(event.type === "pointerup" && travelled > CLICK_PX);
+      if (travelled > CLICK_PX) return;
+    }
     if (event.type === "pointerup" && travelled <= CLICK_PX) listener.clicked(...place(event));
   };
   canvas.addEventListener("pointerup", up);

@@ -44,6 +44,11 @@ export interface Run {
   circles: Circle[];
   /** Columns and rows of the partitions over the rectangle around the arena. */
   partitions: [number, number];
+  /** Robots within this distance of a partition are known to it, mm. */
+  ghostMargin: number;
+  /** The events SENT and RECEIVED are recorded. */
+  sentRecorded: boolean;
+  receivedRecorded: boolean;
   groups: Group[];
 }
 
@@ -122,7 +127,48 @@ export interface OutsideText {
   alarms: string[];
 }
 
+/** Messages that ended after tick `from`, up to tick `until`; a sender that is its own receiver has sent. */
+export interface FlightsText {
+  type: "flights";
+  from: number;
+  until: number;
+  /** Messages are known up to this tick. */
+  newest: number;
+  /** false: there were more. */
+  whole: boolean;
+  sender: number[];
+  receiver: number[];
+  tick: number[];
+}
+
+/** Wall time by what a federate did, s. */
+export interface FederateWork {
+  name: string;
+  step: number;
+  exchange: number;
+  wait: number;
+}
+
+export interface WorkText {
+  type: "work";
+  /** Of the last seconds; else of the whole run. */
+  live: boolean;
+  federates: FederateWork[];
+  /** Of a run in one process: CPU time by subject, ns per robot and tick. */
+  cost: { name: string; ns: number }[];
+}
+
+export interface MarksText {
+  type: "marks";
+  /** false: there are more, if they are asked for again. */
+  whole: boolean;
+  marks: { tick: number; text: string }[];
+}
+
 export type Message =
+  | FlightsText
+  | WorkText
+  | MarksText
   | OutsideText
   | PlotData
   | ProgramText

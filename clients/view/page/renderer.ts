@@ -1,11 +1,16 @@
 // Draws one picture of the run with WebGL 2. It keeps one buffer for all robots and never an object per robot.
 import type { Camera } from "./camera.ts";
 import { GRID_PX, Triangles, circle, outline, roundStep, type Colour, type Point } from "./geometry.ts";
+import { FLOATS } from "./flights.ts";
+import { bordersOf } from "./partitions.ts";
 import type { Floor, Frame, Run } from "./protocol.ts";
 import * as shaders from "./shaders.ts";
 
 const BYTES_PER_VERTEX = 8;
 const LEAST_RADIUS_PX = 1.7;
+/** Vertices of a message: the strip along its arc. */
+const FLIGHT_VERTICES = 34;
+const GHOST_ALPHA = 30;
 
 /** Colours of a theme, 0 to 255. */
 export interface Palette {
@@ -22,6 +27,8 @@ export interface Palette {
   fault: Colour;
   tracked: Colour;
   accent: Colour;
+  message: Colour;
+  ghost: Colour;
 }
 
 /** What lies above the arena besides robots. */
@@ -31,6 +38,12 @@ export interface Marks {
   range: number;
   /** Where tracked robots are with a probability of 95 %: rims. */
   ellipses: Point[][];
+  /** Messages: FLOATS of flights.ts each. */
+  flights: Float32Array;
+  /** Robots that have changed their partition, each with how much of its flash has passed, 0 to 1. */
+  flashes: { at: Point; part: number }[];
+  /** A body that is being placed elsewhere. */
+  held: { rim: Point[]; arm: [Point, Point]; handle: Point[] } | undefined;
 }
 
 class Program {
@@ -74,6 +87,8 @@ export class Renderer {
   readonly #robots: Program;
   readonly #trails: Program;
   readonly #floor: Program;
+  readonly #flights: Program;
+  readonly #flightBuffer: WebGLBuffer;
   readonly #flatBuffer: WebGLBuffer;
   readonly #robotBuffer: WebGLBuffer;
   readonly #indexBuffer: WebGLBuffer;
@@ -98,6 +113,8 @@ export class Renderer {
     this.#robots = new Program(gl, shaders.ROBOT_VERTEX, shaders.ROBOT_FRAGMENT, ["a_place", "a_headingLed", "a_stateKind"]);
     this.#trails = new Program(gl, shaders.TRAIL_VERTEX, shaders.TRAIL_FRAGMENT, ["a_place"]);
     this.#floor = new Program(gl, shaders.FLOOR_VERTEX, shaders.FLOOR_FRAGMENT, ["a_position"]);
+    this.#flights = new Program(gl, shaders.FLIGHT_VERTEX, shaders.FLIGHT_FRAGMENT, ["a_ends", "a_age"]);
+    this.#flightBuffer = gl.createBuffer();
     this.#flatBuffer = gl.createBuffer();
     this.#robotBuffer = gl.createBuffer();
     this.#indexBuffer = gl.createBuffer();
@@ -230,6 +247,7 @@ export class Renderer {
     this.#drawTriangles(this.#below, view);
     this.#drawTrails(run, palette, view);
     if (frame) this.#drawRobots(run, camera, palette, view, radius);
+    this.#drawFlights(marks.flights, camera, palette, view, radius);
     this.#above.clear();
     this.#marks(camera, palette, marks, radius);
     this.#drawTriangles(this.#above, view);
@@ -251,7 +269,7 @@ export class Renderer {
     this.#below.path(this.#edge(run), 3 * px, palette.wall, true);
   }
 
-  /** Borders of partitions, dashed. */
+  /** Borders of partitions, dashed, and the margin of ghosts on both sides. */
   #partitions(run: Run, px: number, palette: Palette): void {
     const { halfWidth: w, halfHeight: h } = run.arena;
     const dash = 7 * px;
@@ -261,9 +279,15 @@ export class Renderer {
       const at = (part: number): Point => [from[0] + (to[0] - from[0]) * part, from[1] + (to[1] - from[1]) * part];
       for (let i = 0; i < dashes; ++i) this.#below.line(at(i / dashes), at((i + 0.5) / dashes), 1.5 * px, palette.obstacle);
     };
-    const [columns, rows] = run.partitions;
-    for (let c = 1; c < columns; ++c) dashed([-w + (2 * w * c) / columns, -h], [-w + (2 * w * c) / columns, h]);
-    for (let r = 1; r < rows; ++r) dashed([-w, -h + (2 * h * r) / rows], [w, -h + (2 * h * r) / rows]);
+    const [columns, rows] = bordersOf(run);
+    const g = run.ghostMargin;
+    const band: Colour = [palette.ghost[0], palette.ghost[1], palette.ghost[2], GHOST_ALPHA];
+    if (g > 0) {
+      for (const x of columns) this.#below.convex([[x - g, -h], [x + g, -h], [x + g, h], [x - g, h]], band);
+      for (const y of rows) this.#below.convex([[-w, y - g], [w, y - g], [w, y + g], [-w, y + g]], band);
+    }
+    for (const x of columns) dashed([x, -h], [x, h]);
+    for (const y of rows) dashed([-w, y], [w, y]);
   }
 
   #edge(run: Run): Point[] {
@@ -298,6 +322,20 @@ export class Renderer {
   #marks(camera: Camera, palette: Palette, marks: Marks, radius: number): void {
     const px = 1 / camera.pxPerMm;
     for (const rim of marks.ellipses) this.#above.path(rim, 1.5 * px, palette.tracked, true);
+    for (const { at, part } of marks.flashes) {
+      const rim = circle(...at, radius * (1.3 + 1.6 * part), 32);
+      this.#above.path(rim, 3 * px, [palette.ghost[0], palette.ghost[1], palette.ghost[2], Math.round(255 * (1 - part))], true);
+    }
+    if (marks.held) {
+      const { rim, arm, handle } = marks.held;
+      const dashed = rim.length > 16 ? rim : rim.flatMap((corner, i) => Array.from({ length: 12 }, (_, k): Point => {
+        const next = rim[(i + 1) % rim.length]!;
+        return [corner[0] + ((next[0] - corner[0]) * k) / 12, corner[1] + ((next[1] - corner[1]) * k) / 12];
+      }));
+      for (let i = 0; i < dashed.length; i += 2) this.#above.line(dashed[i]!, dashed[(i + 1) % dashed.length]!, 2 * px, palette.accent);
+      this.#above.line(...arm, 1.5 * px, palette.accent);
+      this.#above.convex(handle, palette.accent);
+    }
     this.#above.path(marks.trail, 2 * px, palette.accent);
     if (!marks.selected) return;
     this.#above.path(circle(...marks.selected, radius + 4 * px, 48), 2.5 * px, palette.accent, true);
@@ -361,6 +399,10 @@ export class Renderer {
     gl.uniform3f(this.#robots.at("u_body"), ...unit(palette.body));
     gl.uniform3f(this.#robots.at("u_fault"), ...unit(palette.fault));
     gl.uniform3f(this.#robots.at("u_tracked"), ...unit(palette.tracked));
+    gl.uniform3f(this.#robots.at("u_ghost"), ...unit(palette.ghost));
+    gl.uniform2f(this.#robots.at("u_cells"), ...run.partitions);
+    gl.uniform2f(this.#robots.at("u_half"), run.arena.halfWidth, run.arena.halfHeight);
+    gl.uniform1f(this.#robots.at("u_margin"), run.ghostMargin);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.#robotBuffer);
     this.#attributes(3);
     gl.vertexAttribPointer(0, 2, gl.UNSIGNED_SHORT, false, BYTES_PER_VERTEX, 0);
@@ -368,6 +410,25 @@ export class Renderer {
     gl.vertexAttribPointer(2, 2, gl.UNSIGNED_BYTE, false, BYTES_PER_VERTEX, 6);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.#indexBuffer);
     gl.drawElements(gl.TRIANGLES, 6 * this.#robotCount, gl.UNSIGNED_INT, 0);
+  }
+
+  /** All messages by one call, an instance each. */
+  #drawFlights(flights: Float32Array, camera: Camera, palette: Palette, view: [number, number, number, number], radius: number): void {
+    const gl = this.#gl;
+    if (flights.length === 0) return;
+    gl.useProgram(this.#flights.program);
+    gl.uniform4f(this.#flights.at("u_view"), ...view);
+    gl.uniform1f(this.#flights.at("u_pxPerMm"), camera.pxPerMm);
+    gl.uniform1f(this.#flights.at("u_radius"), radius);
+    gl.uniform3f(this.#flights.at("u_colour"), ...unit(palette.message));
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.#flightBuffer);
+    gl.bufferData(gl.ARRAY_BUFFER, flights, gl.STREAM_DRAW);
+    this.#attributes(2);
+    gl.vertexAttribPointer(0, 4, gl.FLOAT, false, 4 * FLOATS, 0);
+    gl.vertexAttribPointer(1, 2, gl.FLOAT, false, 4 * FLOATS, 16);
+    for (const i of [0, 1]) gl.vertexAttribDivisor(i, 1);
+    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, FLIGHT_VERTICES, flights.length / FLOATS);
+    for (const i of [0, 1]) gl.vertexAttribDivisor(i, 0);
   }
 
   #attributes(count: number): void {

@@ -25,6 +25,9 @@ in vec2 a_stateKind;
 uniform vec4 u_view;
 uniform vec2 u_grid;    // lowest, step, mm
 uniform float u_radius; // mm
+uniform vec2 u_cells, u_half; // columns and rows of partitions; half of the rectangle around the arena, mm
+uniform float u_margin; // mm
+flat out float v_ghost; // 1: within the margin of a border between partitions
 out vec2 v_at;          // in the robot's frame, in radii
 flat out vec3 v_led;
 flat out vec2 v_lifeKind;
@@ -39,20 +42,26 @@ void main() {
   vec2 ahead = vec2(cos(heading), sin(heading));
   v_at = vec2(dot(offset, ahead), dot(offset, vec2(-ahead.y, ahead.x)));
   v_led = vec3(float(value & 3), float((value >> 2) & 3), float((value >> 4) & 3)) / 3.0;
+  vec2 cell = (centre + u_half) / (2.0 * u_half) * u_cells;
+  vec2 border = clamp(floor(cell + 0.5), vec2(1.0), max(u_cells - 1.0, vec2(1.0)));
+  vec2 away = abs(cell - border) * (2.0 * u_half) / u_cells;
+  v_ghost = (u_cells.x > 1.5 && away.x <= u_margin) || (u_cells.y > 1.5 && away.y <= u_margin) ? 1.0 : 0.0;
   int life = int(a_stateKind.x) & 15;
   v_lifeKind = vec2(float(life), a_stateKind.y);
   if (life == 13) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);  // absent: outside the picture
 }`;
 
 // Disc in the LED's colour with a rim, a bar towards the heading, and a mark by state and kind: a cross for failed robots, a
-// minus for flat batteries, a square around tracked ones, a square inside firmware ones.
+// minus for flat batteries, a square around tracked ones, a square inside firmware ones, a dotted ring around those that several
+// partitions know.
 export const ROBOT_FRAGMENT = `#version 300 es
 precision highp float;
 in vec2 v_at;
 flat in vec3 v_led;
 flat in vec2 v_lifeKind;
+flat in float v_ghost;
 uniform float u_pxPerRadius;
-uniform vec3 u_ink, u_body, u_fault, u_tracked;
+uniform vec3 u_ink, u_body, u_fault, u_tracked, u_ghost;
 out vec4 colour;
 float inside(float distance) { return clamp(0.5 - distance * u_pxPerRadius, 0.0, 1.0); }
 void main() {
@@ -69,6 +78,12 @@ void main() {
   if (kind > 0.5 && kind < 1.5) {
     float square = abs(max(abs(v_at.x), abs(v_at.y)) - 0.42) - 0.08;
     mixed = mix(mixed, lit ? mark : u_ink, inside(square));
+  }
+  if (v_ghost > 0.5) {
+    float dots = step(0.5, fract(atan(v_at.y, v_at.x) * 1.2732395));  // eight of them
+    float ring = inside(abs(r - 1.22) - 0.1) * dots;
+    mixed = mix(mixed, u_ghost, ring * (1.0 - disc));
+    alpha = max(alpha, ring);
   }
   if (kind > 1.5) {
     float frame = inside(abs(max(abs(v_at.x), abs(v_at.y)) - 1.28) - 0.09);
@@ -89,6 +104,52 @@ void main() {
   }
   if (alpha <= 0.0) discard;
   colour = vec4(mixed * alpha, alpha);
+}`;
+
+// One instance per message: an arc from the sender to the receiver, or a ring around a robot that has sent. It fades with its age;
+// its front runs ahead in the first half.
+export const FLIGHT_VERTEX = `#version 300 es
+in vec4 a_ends;      // mm
+in vec2 a_age;       // 0 to 1, emphasis
+uniform vec4 u_view;
+uniform float u_pxPerMm, u_radius;
+out float v_along;
+flat out vec2 v_age;
+void main() {
+  const float segments = 16.0, turn = 6.2831853;
+  float along = float(gl_VertexID >> 1) / segments;
+  float side = (gl_VertexID & 1) == 0 ? -1.0 : 1.0;
+  vec2 way = a_ends.zw - a_ends.xy;
+  float distance = length(way);
+  vec2 at, normal;
+  if (distance < 0.001) {
+    normal = vec2(cos(turn * along), sin(turn * along));
+    at = a_ends.xy + u_radius * (1.15 + 1.2 * a_age.x) * normal;
+  } else {
+    vec2 across = vec2(-way.y, way.x) / distance;
+    float bulge = 0.12 * distance;
+    at = a_ends.xy + way * along + across * bulge * 4.0 * along * (1.0 - along);
+    vec2 tangent = way + across * bulge * 4.0 * (1.0 - 2.0 * along);
+    normal = vec2(-tangent.y, tangent.x) / length(tangent);
+  }
+  float width = (a_age.y > 0.75 ? 2.2 : 1.5) / u_pxPerMm;
+  gl_Position = vec4((at + 0.5 * width * side * normal) * u_view.xy + u_view.zw, 0.0, 1.0);
+  v_along = distance < 0.001 ? 0.0 : along;
+  v_age = a_age;
+}`;
+
+export const FLIGHT_FRAGMENT = `#version 300 es
+precision highp float;
+in float v_along;
+flat in vec2 v_age;
+uniform vec3 u_colour;
+out vec4 colour;
+void main() {
+  float front = min(1.0, 2.0 * v_age.x);
+  if (v_along > front) discard;
+  float near = 1.0 - clamp((front - v_along) * 4.0, 0.0, 1.0);
+  float alpha = (1.0 - v_age.x) * mix(0.2, 1.0, v_age.y) * mix(0.55, 1.0, near);
+  colour = vec4(u_colour * alpha, alpha);
 }`;
 
 export const TRAIL_VERTEX = `#version 300 es

@@ -1,7 +1,9 @@
 // The picture as SVG: what is seen, in the same section of the arena. Robots of one look share one path, so that a file of a
 // thousand robots has some dozen elements.
 import type { Camera } from "./camera.ts";
+import { FLOATS } from "./flights.ts";
 import { circle, outline, type Colour, type Point } from "./geometry.ts";
+import { bordersOf, isGhost } from "./partitions.ts";
 import {
   headingOf, KINDS, ledOf, LIFE_ABSENT, LIFE_FAILED, LIFE_FLAT, lifeOf, type Circle, type Floor, type Frame, type Run,
 } from "./protocol.ts";
@@ -74,6 +76,12 @@ export function svgOf(scene: Scene, camera: Camera, palette: Palette): string {
   for (const spot of spots) below.add(line(palette.accent, 2, ' stroke-dasharray="6 6"'), disc(at([spot.x, spot.y]), spot.radius * scale));
   for (const lamp of run.lamps) below.add(fill(palette.lamp), disc(at([lamp.x, lamp.y]), 9));
   for (const body of run.obstacles) below.add(fill(palette.obstacle), path(outline(body, ...body.pose).map(at), true));
+  const [columns, rows] = bordersOf(run);
+  const borders: [Point, Point][] = [...columns.map((x): [Point, Point] => [[x, -h], [x, h]]), ...rows.map((y): [Point, Point] => [[-w, y], [w, y]])];
+  for (const [from, to] of borders) {
+    if (run.ghostMargin > 0) below.add(`${line(palette.ghost, 2 * run.ghostMargin * scale)} stroke-opacity="0.12"`, path([at(from), at(to)], false));
+    below.add(line(palette.obstacle, 1.5, ' stroke-dasharray="7 7"'), path([at(from), at(to)], false));
+  }
   const m = run.movables.length;
   if (scene.movables.length === 3 * m) {
     run.movables.forEach((body, i) => {
@@ -96,12 +104,22 @@ export function svgOf(scene: Scene, camera: Camera, palette: Palette): string {
     const square = (half: number): string => path([[x - half, y - half], [x + half, y - half], [x + half, y + half], [x - half, y + half]], true);
     if (scene.kinds[robot] === KINDS.firmware) above.add(line(palette.ink, 0.16 * r), square(0.42 * r));
     if (scene.kinds[robot] === KINDS.tracked) above.add(line(palette.tracked, 0.18 * r), square(1.28 * r));
+    if (isGhost(run, ...scene.placeOf(robot))) above.add(line(palette.ghost, 0.2 * r, ` stroke-dasharray="${n(0.48 * r)}"`), disc(place, 1.22 * r));
     if (life === LIFE_FAILED) {
       above.add(line(palette.fault, 0.3 * r), path([[x - 0.9 * r, y - 0.9 * r], [x + 0.9 * r, y + 0.9 * r]], false) + path([[x - 0.9 * r, y + 0.9 * r], [x + 0.9 * r, y - 0.9 * r]], false));
     }
     if (life === LIFE_FLAT) above.add(line(palette.fault, 0.32 * r), path([[x - 1.2 * r, y], [x + 1.2 * r, y]], false));
   }
   const { marks } = scene;
+  for (let i = 0; i < marks.flights.length; i += FLOATS) {
+    const [fromX, fromY, toX, toY, age] = marks.flights.subarray(i, i + FLOATS) as unknown as [number, number, number, number, number];
+    const [a, b] = [at([fromX, fromY]), at([toX, toY])];
+    const colour = line(palette.message, 1.5, ` stroke-opacity="${(Math.ceil(4 * (1 - age)) / 4).toFixed(2)}"`);
+    // The control point of the arc lies to the left of the way.
+    const bend: Point = [(a[0] + b[0]) / 2 + 0.24 * (b[1] - a[1]), (a[1] + b[1]) / 2 - 0.24 * (b[0] - a[0])];
+    if (fromX === toX && fromY === toY) above.add(colour, disc(a, r * (1.15 + 1.2 * age)));
+    else above.add(colour, `M${n(a[0])} ${n(a[1])}Q${n(bend[0])} ${n(bend[1])} ${n(b[0])} ${n(b[1])}`);
+  }
   for (const rimOf of marks.ellipses) above.add(line(palette.tracked, 1.5), path(rimOf.map(at), true));
   if (marks.trail.length > 1) above.add(line(palette.accent, 2), path(marks.trail.map(at), false));
   const words: string[] = [];

@@ -37,6 +37,7 @@ export class Theme {
       background: colour("background"), floor: colour("floor"), grid: colour("grid"), wall: colour("wall"),
       obstacle: colour("obstacle"), movable: colour("movable"), movableRim: colour("movable-rim"), lamp: colour("lamp"),
       ink: colour("ink"), body: colour("body"), fault: colour("fault"), tracked: colour("tracked"), accent: colour("accent"),
+      message: colour("message"), ghost: colour("ghost"),
     };
     this.#changed();
   }

@@ -12,6 +12,7 @@
 
 #include "clients/view/recorded_run.hpp"
 #include "core/base/error.hpp"
+#include "core/base/pose.hpp"
 #include "tests/clients/view/recordings.hpp"
 #include "tests/clients/view/websocket_client.hpp"
 #include "tests/system/program.hpp"
@@ -30,10 +31,12 @@ class NotedRun : public RecordedRun {
   using RecordedRun::RecordedRun;
   [[nodiscard]] std::string steer(const Request& request) override {
     if (request.kind == Request::Kind::kOverhead) packets.push_back(request.packet);
+    if (request.kind == Request::Kind::kPlace) places.push_back(request.place);
     steered.push_back(request.kind);
     return request.kind == Request::Kind::kStop ? "not now" : "";
   }
   std::vector<OverheadPacket> packets;
+  std::vector<Relocation> places;
   std::vector<Request::Kind> steered;  // of the gateway's thread; read it after an answer
 };
 
@@ -113,6 +116,12 @@ TEST_F(GatewayTest, AnswersWithTheStateAtATick) {
   EXPECT_TRUE(viewer.await("robot"));
   viewer.send_text(R"({"do":"trail","robot":1,"tick":100})");
   EXPECT_TRUE(viewer.await("trail"));
+  for (const char* kind : {"work", "marks"}) {
+    viewer.send_text(std::string(R"({"do":")") + kind + "\"}");
+    EXPECT_TRUE(viewer.await(kind)) << kind;
+  }
+  viewer.send_text(R"({"do":"flights","from":-1,"tick":100})");
+  EXPECT_TRUE(viewer.await("flights"));
 }
 
 TEST_F(GatewayTest, GivesEveryViewerTheNewestLiveStateOncePerRequest) {
@@ -145,11 +154,19 @@ TEST_F(GatewayTest, OnlyTheTokenAllowsToSteer) {
   EXPECT_NE(viewer.await("grant")->payload.find("true"), std::string::npos);
   viewer.send_text(R"({"do":"pause"})");
   viewer.send_text(R"({"do":"overhead","command":6,"message":"0a0000000000000000ff"})");
+  viewer.send_text(R"({"do":"place","robot":3,"x":-12.5,"y":40,"heading":7})");
+  viewer.send_text(R"({"do":"place","movable":1,"x":1,"y":2,"heading":-1})");
   viewer.send_text(R"({"do":"stop"})");
   const auto refusal = viewer.await("notice");
   ASSERT_TRUE(refusal);
   EXPECT_NE(refusal->payload.find("not now"), std::string::npos);
-  EXPECT_EQ(run_->steered, (std::vector{Request::Kind::kPause, Request::Kind::kOverhead, Request::Kind::kStop}));
+  EXPECT_EQ(run_->steered, (std::vector{Request::Kind::kPause, Request::Kind::kOverhead, Request::Kind::kPlace,
+                                        Request::Kind::kPlace, Request::Kind::kStop}));
+  ASSERT_EQ(run_->places.size(), 2u);
+  EXPECT_EQ(run_->places[0].body, 3u);
+  EXPECT_EQ(run_->places[0].pose.x_mm, -12.5);
+  EXPECT_NEAR(run_->places[0].pose.heading_rad, 7 - 2 * kPi, 1e-12);
+  EXPECT_TRUE(run_->places[1].movable);
   EXPECT_EQ(run_->packets.at(0).message[9], 255);
   EXPECT_NE(gateway_->address().find(kToken), std::string::npos);
 }
@@ -162,10 +179,14 @@ TEST_F(GatewayTest, DisconnectsWhoBreaksTheRules) {
     return viewer.closed();
   };
   EXPECT_EQ(closing([](WebSocketClient& v) { v.send_text("hello?"); }), 1007);
-  for (const char* wrong : {R"({"do":"overhead","command":6,"message":"0a"})",
-                            R"({"do":"overhead","command":4,"message":"0a0000000000000000ff"})",
-                            R"({"do":"overhead","command":6,"message":"zz0000000000000000ff"})", R"({"do":"plot"})",
-                            R"({"do":"plot","plot":1,"robot":-1})", R"({"do":"program","robot":1})"})
+  for (const char* wrong :
+       {R"({"do":"overhead","command":6,"message":"0a"})",
+        R"({"do":"overhead","command":4,"message":"0a0000000000000000ff"})",
+        R"({"do":"overhead","command":6,"message":"zz0000000000000000ff"})", R"({"do":"plot"})",
+        R"({"do":"plot","plot":1,"robot":-1})", R"({"do":"program","robot":1})",
+        R"({"do":"place","x":1,"y":1,"heading":0})", R"({"do":"place","robot":1,"x":"1","y":1,"heading":0})",
+        R"({"do":"place","robot":-1,"x":1,"y":1,"heading":0})", R"({"do":"place","robot":1,"x":1,"y":1})",
+        R"({"do":"flights","tick":5})"})
     EXPECT_EQ(closing([wrong](WebSocketClient& v) { v.send_text(wrong); }), 1007) << wrong;
   EXPECT_EQ(closing([](WebSocketClient& v) { v.send_frame(2, std::string(40, '\0')); }), 1007);
   EXPECT_EQ(closing([](WebSocketClient& v) { v.send_text(std::string(100000, ' ')); }), 1009);

@@ -1,58 +1,13 @@
-// node page_test.mjs KILOTWIN VIEW SAMPLES NPM SOURCES [PICTURES]: the page in headless Chromium, as people use it. With PICTURES,
-// screenshots go to that directory. Status 77: there is no Chromium or playwright-core.
+// node page_test.mjs KILOTWIN VIEW SAMPLES NPM SOURCES [PICTURES]: the page in headless Chromium, as people use it.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import fs from "node:fs";
-import os from "node:os";
 import path from "node:path";
-import { Served, eventually, launchBrowser } from "./browser.mjs";
-
-const [kilotwin, viewProgram, samples, npm, sources, pictures] = process.argv.slice(2);
-const { browser, reason } = await launchBrowser(npm);
-if (reason) {
-  console.log(`skipped: ${reason}`);
-  process.exit(77);
-}
-const scratch = fs.mkdtempSync(path.join(os.tmpdir(), "kilotwin-page-"));
-const HALF_MM = 1000; // of the arena
-const started = [];
-
-async function serve(words) {
-  const served = await Served.start(words, scratch);
-  started.push(served);
-  return served;
-}
-
-/** A page that fails the test on any error, and on any request to another address. */
-async function open(address) {
-  const page = await browser.newPage({ viewport: { width: 1280, height: 720 } });
-  page.faults = [];
-  page.on("pageerror", (error) => page.faults.push(error.message));
-  page.on("console", (message) => {
-    // The browser reports every refused connection; the page tries again.
-    if (message.type() === "error" && !message.text().includes("ERR_CONNECTION_REFUSED")) page.faults.push(message.text());
-  });
-  page.on("request", (request) => {
-    if (new URL(request.url()).host !== new URL(address).host && !request.url().startsWith("blob:")) page.faults.push(request.url());
-  });
-  await page.goto(address);
-  await connected(page);
-  return page;
-}
-const text = (page, id) => page.locator(`#${id}`).textContent();
-const connected = (page) => eventually("connected", async () => (await page.locator("body").getAttribute("data-connection")) === "open");
-const received = (page) => page.evaluate(() => window.kilotwin.received);
-const drawn = (page) => page.evaluate(() => window.kilotwin.drawn);
-const clock = async (page) => Number.parseFloat(await text(page, "clock"));
-const press = (page, name) => page.getByRole("button", { name, exact: true }).click();
-const picture = async (page, name) => pictures && page.screenshot({ path: path.join(pictures, `${name}.png`) });
-
-/** Where a place of the arena is while the whole arena is shown. */
-async function onScreen(page, x, y) {
-  const box = await page.locator("#picture").boundingBox();
-  const pxPerMm = Math.min(box.width, box.height) / (2 * 1.06 * HALF_MM);
-  return [box.x + box.width / 2 + x * pxPerMm, box.y + box.height / 2 - y * pxPerMm];
-}
+import { eventually } from "./browser.mjs";
+import {
+  clock, connected, counter, drawn, HALF_MM, kilotwin, newContext, onScreen, open, phase, picture, pictures, press, received, run, samples,
+  saved, scratch, serve, text, viewProgram,
+} from "./page_tools.mjs";
 
 /** Where robot `i` of the sample is: tests/clients/view/recordings.hpp. */
 function circling(i, time) {
@@ -99,12 +54,39 @@ async function recordedRun() {
   await eventually("its counters", async () => (await text(page, "robot-facts")).includes("messages sent703"));
   await picture(page, "recorded");
 
+  // Messages fly between robots of the recording, a bounded number in a picture; the button hides them.
+  const messagesDrawn = async () => {
+    const before = await counter(page, "flights");
+    const drawnBefore = await drawn(page);
+    await page.keyboard.press("t");
+    await page.keyboard.press("t");
+    await eventually("another picture", async () => (await drawn(page)) > drawnBefore);
+    return (await counter(page, "flights")) - before;
+  };
+  await eventually("messages", async () => (await messagesDrawn()) > 0);
+  await press(page, "Messages");
+  assert.equal(await messagesDrawn(), 0);
+  await press(page, "Messages");
+  await eventually("messages again", async () => (await messagesDrawn()) > 0);
+
+  // A mark of the time line leads to the tick at which a robot was placed.
+  await eventually("a mark", async () => (await page.locator("#marks span").count()) === 1);
+  assert.match(await page.locator("#marks span").getAttribute("title"), /robot 4 placed at 120, -80 mm, heading 90/);
+  const stood = await clock(page);
+  await page.locator("#marks span").click();
+  await eventually("the mark's time", async () => Math.abs((await clock(page)) - 50) < 0.6);
+  await page.locator("#line").fill(String(Math.round(stood / 0.032768)));
+  await eventually("back", async () => Math.abs((await clock(page)) - stood) < 0.001);
+  // Nothing moves in a recording, and the page says so.
+  await page.keyboard.press("g");
+  await eventually("the reason", async () => (await text(page, "notice")).includes("Moving needs a run that goes on"));
+
   // Dragging moves the picture with the pointer: the robot is now 120 px further right and 40 px lower.
   const box = await page.locator("#picture").boundingBox();
-  await page.mouse.move(box.x + 40, box.y + 300);
+  await page.mouse.move(box.x + 90, box.y + 300);
   await page.mouse.down();
-  await page.mouse.move(box.x + 100, box.y + 320, { steps: 4 });
-  await page.mouse.move(box.x + 160, box.y + 340, { steps: 4 });
+  await page.mouse.move(box.x + 150, box.y + 320, { steps: 4 });
+  await page.mouse.move(box.x + 210, box.y + 340, { steps: 4 });
   await page.mouse.up();
   await page.keyboard.press("Escape");
   await click(701, 120, 40);
@@ -124,15 +106,10 @@ async function recordedRun() {
   await page.locator("#find-id").fill("5000");
   await press(page, "Select");
   await eventually("no such robot", async () => (await text(page, "notice")).includes("0 to 999"));
-  const saved = async (name) => {
-    const download = page.waitForEvent("download");
-    await press(page, name);
-    return fs.readFileSync(await (await download).path());
-  };
-  assert.equal((await saved("Save the picture as PNG")).subarray(1, 4).toString(), "PNG");
+  assert.equal((await saved(page, "Save the picture as PNG")).subarray(1, 4).toString(), "PNG");
 
   // The SVG has the same robots at the same places: a disc per robot, the ellipses of 9 tracked ones, some dozen elements.
-  const svg = (await saved("Save the picture as SVG")).toString();
+  const svg = (await saved(page, "Save the picture as SVG")).toString();
   const elements = await page.evaluate((source) => {
     const parsed = new DOMParser().parseFromString(source, "image/svg+xml");
     return parsed.querySelector("parsererror") ? undefined : [...parsed.querySelectorAll("path")].map((one) => one.outerHTML);
@@ -181,7 +158,8 @@ function talkingExperiment() {
   const experiment = path.join(scratch, "talk.txtpb");
   fs.writeFileSync(experiment, `duration_s: 600 seed: 5 arena { width_mm: 2000 height_mm: 2000 }
     robots { count: 100 behaviour: "talk.c" layout { grid { pitch_mm: 60 } } }
-    recording { every_s: 0.5 variable { name: "rounds" every_s: 0.5 } }`);
+    recording { every_s: 0.5 variable { name: "rounds" every_s: 0.5 } }
+    observable { name: "mean_rounds" value: "mean(rounds)" }`);
   return experiment;
 }
 
@@ -193,10 +171,10 @@ async function line(page, plot, name) {
 }
 
 async function plotsAndPrograms() {
-  const run = path.join(scratch, "talked");
-  execFileSync(kilotwin, ["run", talkingExperiment(), "--duration", "30", "--mode", "local", "--quiet", "--out", run]);
-  fs.writeFileSync(path.join(run, "alarms.txt"), "monitor: 12.0 s: robot 2 <b>leaves</b> the model\nmonitor: 25.0 s: robot 4 leaves the model\n");
-  const served = await serve([viewProgram, "view", run]);
+  const talked = path.join(scratch, "talked");
+  execFileSync(kilotwin, ["run", talkingExperiment(), "--duration", "30", "--mode", "local", "--quiet", "--out", talked]);
+  fs.writeFileSync(path.join(talked, "alarms.txt"), "monitor: 12.0 s: robot 2 <b>leaves</b> the model\nmonitor: 25.0 s: robot 4 leaves the model\n");
+  const served = await serve([viewProgram, "view", talked]);
   const page = await open(served.address);
   await eventually("a picture", async () => (await drawn(page)) > 1);
   await press(page, "Pause");
@@ -212,6 +190,10 @@ async function plotsAndPrograms() {
   assert.match(log, new RegExp(`round ${await rounds()} <img src=x onerror=alert\\(1\\)>\n$`));
   assert.equal(await page.locator("#robot-log img").count(), 0);
 
+  // Where the time went: a run in one process has its cost by subject.
+  await eventually("the cost", async () => (await text(page, "federates")).includes("behaviours"));
+  assert.equal(await text(page, "work-verdict"), "All engines share one process.");
+
   // Alarms of the residual monitor, up to this time.
   assert.equal(await text(page, "alarm-lines"), "12.0 s: robot 2 <b>leaves</b> the model");
 
@@ -223,6 +205,8 @@ async function plotsAndPrograms() {
   await page.locator("#plots select").nth(2).selectOption({ label: "rounds of robot 42" });
   await eventually("the robot's variable", async () => (await line(page, 3, "value")) === (await rounds()));
   await picture(page, "plots");
+  await page.locator("#plots select").nth(1).selectOption({ label: "mean_rounds (observable)" });
+  await eventually("the experiment's own observable", async () => (await line(page, 2, "value")) === (await rounds()));
   const plot = await page.locator("#plots .plot:nth-child(3) .u-over").boundingBox();
   await page.mouse.click(plot.x + plot.width / 2, plot.y + plot.height / 2);
   await eventually("half of the time", async () => Math.abs((await clock(page)) - 15) < 1);
@@ -241,13 +225,12 @@ async function liveRun() {
   const served = await serve([kilotwin, "run", talkingExperiment(), "--pace", "1",
     "--partitions", "2x1", "--out", path.join(scratch, "run"), "--view"]);
   const page = await open(served.address);
-  const phase = (wanted) => eventually(`phase ${wanted}`, async () => (await text(page, "phase")) === wanted);
-  await phase("live: running");
+  await phase(page, "live: running");
   await eventually("states", async () => (await received(page)) > 5);
   assert.equal(await text(page, "count"), "100");
 
   // Without the token nothing steers.
-  const stranger = await (await browser.newContext()).newPage();
+  const stranger = await (await newContext()).newPage();
   await stranger.goto(served.address.replace(/#.*/, ""));
   await eventually("the stranger watches", async () => (await received(stranger)) > 1);
   assert.ok(await stranger.locator("#play").isDisabled());
@@ -256,7 +239,7 @@ async function liveRun() {
   await stranger.context().close();
 
   await press(page, "Pause");
-  await phase("live: paused");
+  await phase(page, "live: paused");
   const tickOf = async () => Math.round((await clock(page)) / 0.032768);
   let tick = -1;
   await eventually("time stands still", async () => {
@@ -282,6 +265,8 @@ async function liveRun() {
   await page.locator("#plots select").nth(2).selectOption({ label: "rounds of robot 7" });
   await eventually("its curve", async () => (await line(page, 3, "value")) >= 1);
   await page.locator("#plots select").nth(1).selectOption({ label: "simulated over real time" });
+  await page.locator("#plots select").nth(0).selectOption({ label: "mean_rounds (observable)" });
+  await eventually("the experiment's own observable", async () => (await line(page, 1, "value")) >= 0);
   await eventually("the speed", async () => (await line(page, 2, "value")) > 0);
   // A message for the overhead controller; what is no message is not sent.
   await page.locator("#overhead-type").fill("3");
@@ -292,19 +277,20 @@ async function liveRun() {
   await press(page, "Send");
   await eventually("the packet", async () => (await text(page, "packets")).includes("once  type 3  0a1b"));
   await press(page, "Pause");
-  await phase("live: paused");
+  await phase(page, "live: paused");
   tick = await tickOf();
   await picture(page, "live");
   await page.keyboard.press("p");
   await page.keyboard.press("Escape");
   await press(page, "Continue");
-  await phase("live: running");
+  await phase(page, "live: running");
   await eventually("it goes on", async () => (await tickOf()) > tick + 20);
 
   // Stopped, the run becomes a recording in the same page.
   page.once("dialog", (dialog) => dialog.accept());
   await press(page, "Stop the run for good");
-  await phase("recorded");
+  await phase(page, "recorded");
+  await eventually("where the time went", async () => (await text(page, "work-span")) === "whole run" && (await text(page, "federates")).includes("physics 1,0computes"));
   await eventually("its recording", async () => (await text(page, "run-facts")).includes("states"));
   await eventually("the packet in the recording", async () => (await text(page, "packets")).includes("once  type 3  0a1b"));
   await eventually("the launcher's end", () => served.text.includes("the page now shows the recording"));
@@ -313,13 +299,4 @@ async function liveRun() {
   assert.equal(await served.stop(), 0);
 }
 
-try {
-  await recordedRun();
-  await plotsAndPrograms();
-  await liveRun();
-  console.log("the page does what it should");
-} finally {
-  await browser.close();
-  for (const served of started) await served.stop();
-  fs.rmSync(scratch, { recursive: true, force: true });
-}
+await run(recordedRun, plotsAndPrograms, liveRun);

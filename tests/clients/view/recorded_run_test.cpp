@@ -10,8 +10,11 @@
 #include <nlohmann/json.hpp>
 
 #include "clients/recorder/observables.hpp"
+#include "clients/view/flights.hpp"
 #include "clients/view/robot_log.hpp"
+#include "clients/view/watched_plan.hpp"
 #include "core/base/error.hpp"
+#include "core/plan/tracking_settings.hpp"
 #include "idl/experiment.pb.h"
 #include "tests/clients/view/recordings.hpp"
 #include "tests/system/program.hpp"
@@ -275,6 +278,80 @@ TEST(RecordedCurves, GrowWithTheRecording) {
   EXPECT_EQ(run.plot(sent, 1), fresh.plot(sent, 1));
 }
 
+TEST(RecordedCurves, AreTheObservablesOfTheExperiment) {
+  Scratch scratch;
+  test::write_circling(scratch / "r.ktrec", {.robots = 20, .states = 60, .inside = true, .observables = true});
+  recorder::Reader reader(scratch / "r.ktrec");
+  const recorder::ObservableCurves expected = recorder::observe(reader);
+  ASSERT_EQ(expected.own.size(), 2u);
+  RecordedRun run(scratch / "r.ktrec");
+  for (const recorder::OwnCurve& own : expected.own) {
+    const json plot = whole_plot(run, number_of(run, own.name));
+    ASSERT_EQ(plot["time"].size(), expected.time_s.size()) << own.name;
+    for (std::size_t i = 0; i < own.value.size(); ++i)
+      EXPECT_NEAR(plot["values"][0][i].get<double>(), own.value[i], 1e-5 * std::abs(own.value[i])) << own.name << i;
+  }
+  EXPECT_EQ(run.plot(number_of(run, "far"), 3), "") << "of the swarm alone";
+}
+
+TEST(RecordedCurves, ObservablesGrowWithTheRecordingAndEndAsThoseOfTheWhole) {
+  Scratch scratch;
+  test::write_circling(scratch / "whole.ktrec", {.robots = 5, .states = 400, .inside = true, .observables = true});
+  const std::string whole = test::read(scratch / "whole.ktrec");
+  test::write(scratch / "r.ktrec", whole.substr(0, whole.size() / 2));
+  RecordedRun run(scratch / "r.ktrec");
+  const std::uint32_t most = number_of(run, "most");
+  const json before = whole_plot(run, most);
+  EXPECT_GT(before["time"].size(), 50u);
+  test::write(scratch / "r.ktrec", whole);
+  ASSERT_NE(run.grown(), "");
+  RecordedRun fresh(scratch / "r.ktrec");
+  const json expected = whole_plot(fresh, most);
+  EXPECT_EQ(expected["time"].size(), 400u);
+  // What was told before the end was right; an answer holds for a second.
+  for (std::size_t i = 0; i < before["time"].size(); ++i)
+    ASSERT_EQ(before["values"][0][i], expected["values"][0][i]) << i;
+  ASSERT_TRUE(test::eventually([&] { return whole_plot(run, most)["values"] == expected["values"]; }));
+}
+
+TEST(RecordedRun, TellsWhichMessagesFly) {
+  Scratch scratch;
+  test::write_circling(scratch / "r.ktrec", {.robots = 40, .states = 20, .flights = true});
+  RecordedRun run(scratch / "r.ktrec");
+  const json text = json::parse(run.text());
+  EXPECT_EQ(text["receivedRecorded"], true);
+  EXPECT_EQ(text["sentRecorded"], false);
+  const auto last = text["lastTick"].get<std::int64_t>();
+  const json all = json::parse(run.flights(-1, last));
+  EXPECT_EQ(all["tick"].size(), 19u * 4);
+  EXPECT_EQ(all["whole"], true);
+  for (std::size_t i = 0; i < all["tick"].size(); ++i)
+    EXPECT_EQ(all["sender"][i].get<int>(), all["receiver"][i].get<int>() + 1);
+  // Every message is in one of the parts of a divided time.
+  std::size_t parts = 0;
+  for (std::int64_t from = -1; from < last; from += 7)
+    parts += json::parse(run.flights(from, std::min(last, from + 7)))["tick"].size();
+  EXPECT_EQ(parts, 19u * 4);
+  EXPECT_TRUE(json::parse(run.flights(last, last))["tick"].empty());
+  test::write_circling(scratch / "many.ktrec", {.robots = 20000, .states = 3, .flights = true});
+  RecordedRun many(scratch / "many.ktrec");
+  const json bounded = json::parse(many.flights(-1, 1000));
+  EXPECT_EQ(bounded["tick"].size(), kMostFlights);
+  EXPECT_EQ(bounded["whole"], false);
+}
+
+TEST(RecordedRun, MarksWhatWasPlacedElsewhere) {
+  Scratch scratch;
+  test::write_circling(scratch / "r.ktrec", {.robots = 20, .states = 120, .outside = true, .placed = true});
+  RecordedRun run(scratch / "r.ktrec");
+  const json marks = json::parse(run.marks());
+  ASSERT_EQ(marks["marks"].size(), 1u) << "packets are none";
+  EXPECT_EQ(marks["whole"], true);
+  EXPECT_EQ(marks["marks"][0]["tick"], 1526);
+  EXPECT_EQ(marks["marks"][0]["text"], "robot 4 placed at 120, -80 mm, heading 90\u00b0");
+  EXPECT_EQ(json::parse(run.marks()), marks);
+}
+
 TEST(RecordedRun, TellsWhatTrackersSawAndWhichPacketsCame) {
   Scratch scratch;
   test::write_circling(scratch / "r.ktrec", {.robots = 20, .states = 200, .outside = true});
@@ -327,7 +404,10 @@ TEST(TrackedPlaces, TurnWithTheirTracker) {
   sample.heading_variance_rad2 = {1};
   sample.led = {0};
   std::map<std::uint32_t, TrackedPlace> places;
-  add_places(trackers_of(experiment), sample, places);
+  experiment.set_duration_s(10);
+  const auto plan = plan_of(experiment);
+  ASSERT_TRUE(plan);
+  add_places(plan->tracking_settings().trackers, sample, places);
   ASSERT_EQ(places.size(), 1u);
   EXPECT_NEAR(places[3].x_mm, 100, 1e-9);
   EXPECT_NEAR(places[3].y_mm, 20, 1e-9);

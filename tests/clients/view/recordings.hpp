@@ -19,7 +19,10 @@ struct Circling {
   double every_s = 0.5;
   bool floors = false;   ///< the first at the start, another in the middle
   bool outside = false;  ///< a tracker sees robots 0 to 9, and every tenth state a packet comes from outside
+  bool flights = false;  ///< before each state but the first, every tenth robot receives a message of its successor
+  bool placed = false;   ///< robot 4 is placed at 120, -80 mm, heading 90 degrees, 50 s after the start
   bool inside = false;   ///< variables "count", of two hosts, and "part" of every second robot; events SENT
+  bool observables = false;  ///< "far" of poses, and "most" of the variable "count" and of the displacement
 };
 
 /// The value of "count" of a robot in state `number`; "part" is half of it.
@@ -107,6 +110,32 @@ inline proto::InputRecord circling_packet(std::int64_t tick, int number) {
   return input;
 }
 
+inline proto::InputRecord circling_placement(std::int64_t tick) {
+  proto::InputRecord input;
+  input.set_sequence_number(1000);
+  input.set_tick(tick);
+  input.set_kind(proto::InputRecord::RELOCATION);
+  input.set_robot(4);
+  input.set_x_mm(120);
+  input.set_y_mm(-80);
+  input.set_heading_rad(kPi / 2);
+  return input;
+}
+
+/// In the middle of a tick; robots 0, 10, 20... receive, and robots 1, 11, 21... have sent.
+inline proto::EventRecord circling_flights(std::int64_t tick, std::uint32_t robots) {
+  proto::EventRecord event;
+  event.set_tick(tick);
+  event.set_kind(proto::RECEIVED);
+  for (std::uint32_t i = 0; i + 1 < robots; i += 10) {
+    event.add_robot(i);
+    event.add_sender(i + 1);
+    event.add_distance_mm(50);
+    event.add_offset_cycles(131072);
+  }
+  return event;
+}
+
 inline void write_circling(const std::filesystem::path& file, const Circling& plan) {
   proto::RecordingHeader header;
   header.set_format(recorder::kRecordingFormat);
@@ -128,6 +157,15 @@ inline void write_circling(const std::filesystem::path& file, const Circling& pl
     }
     header.add_event(proto::SENT);
   }
+  if (plan.flights) header.add_event(proto::RECEIVED);
+  if (plan.observables) {
+    proto::Observable& far = *header.add_observable();
+    far.set_name("far");
+    far.set_value("share(x_mm > 100)");
+    proto::Observable& most = *header.add_observable();
+    most.set_name("most");
+    most.set_value("max(count) + msd / 1000");
+  }
   recorder::Writer writer(file, header);
   const TickLength length{header.tick_cycles()};
   const recorder::RecordingSchedule schedule(length, plan.every_s);
@@ -142,6 +180,8 @@ inline void write_circling(const std::filesystem::path& file, const Circling& pl
       heading[i] = pose.heading_rad;
       led[i] = static_cast<std::uint8_t>((i + static_cast<std::uint32_t>(number) / 8) % 64);
     }
+    if (plan.flights && number > 0) writer.event(circling_flights(tick.count() - 1, plan.robots));
+    if (plan.placed && tick == length.at_or_after(50)) writer.input(circling_placement(tick.count()));
     if (plan.floors && number == 0) writer.floor(plain_floor(tick.count(), 10));
     if (plan.floors && number == plan.states / 2) writer.floor(plain_floor(tick.count(), 20));
     writer.state({tick, x, y, heading, led, life});

@@ -62,7 +62,9 @@ int main(int argc, char** argv) {
                                    .states = std::atoi(argv[4]),
                                    .every_s = std::atof(argv[5]),
                                    .floors = true,
-                                   .outside = true});
+                                   .outside = true,
+                                   .flights = true,
+                                   .placed = true});
     return 0;
   }
   fmt::print(stderr, "view_samples: expected recording FILE ROBOTS STATES EVERY_S, or frame FRAME EXPECTED\n");
