@@ -65,6 +65,8 @@ endfunction()
 function(kilotwin_unite name)
   if(KILOTWIN_UNITY)
     set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+    # gcc takes the sources of a unit for headers, whose types must not depend on anonymous namespaces.
+    target_compile_options(${name} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
   endif()
 endfunction()
 

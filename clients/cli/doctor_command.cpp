@@ -19,6 +19,7 @@
 #include "core/dds/dds.hpp"
 #include "core/federation/topics.hpp"
 #include "core/os/temporary_folder.hpp"
+#include "core/os/worker_pool.hpp"
 #include "services/behaviours/compiler.hpp"
 
 namespace kilotwin::cli {
@@ -110,7 +111,7 @@ Finding check_files() {
 }
 
 Finding check_machine() {
-  const unsigned cores = std::thread::hardware_concurrency();
+  const std::uint32_t cores = os::cores();
   const double memory_gib =
       static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1u << 30);
   std::error_code error;

@@ -4,10 +4,10 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <thread>
 
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
+#include "core/os/worker_pool.hpp"
 
 namespace kilotwin::cli {
 namespace {
@@ -56,9 +56,9 @@ std::string place_in_words(const fs::path& used, const Output& output, const fs:
 }
 
 void warn_beyond_cores(const std::string& option, std::uint32_t count) {
-  const unsigned cores = std::thread::hardware_concurrency();
-  if (cores == 0 || count <= cores) return;
-  warn(fmt::format("kilotwin: {} {}: this machine has {} cores; more than {} only take turns, which is slower",
+  const std::uint32_t cores = os::cores();
+  if (count <= cores) return;
+  warn(fmt::format("kilotwin: {} {}: this process may use {} cores; more than {} only take turns, which is slower",
                    option, count, cores, cores));
 }
 

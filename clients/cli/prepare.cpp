@@ -151,35 +151,40 @@ std::vector<fs::path> build_plugins(const LoadedExperiment& loaded, const RunArg
   return objects;
 }
 
+/// A name in `folder` that no file has, for a copy of `source`: its own name, or NAME-2 and so on, as for a file of the same name
+/// from another folder.
+fs::path free_name(const fs::path& folder, const fs::path& source) {
+  fs::path name = folder / source.filename();
+  for (int number = 2; fs::exists(name); ++number)
+    name = folder / fmt::format("{}-{}{}", source.stem().string(), number, source.extension().string());
+  return name;
+}
+
 /// The plugins as built, and their sources for readers. Throws filesystem_error.
 void copy_plugins(const LoadedExperiment& loaded, const proto::Manifest& manifest,
                   const std::vector<fs::path>& objects, const fs::path& to) {
   if (objects.empty()) return;
   fs::create_directories(to);
   std::size_t next = 0;
+  std::set<fs::path> copied;
   for (int i = 0; i < manifest.station_plugin_size(); ++i) {
     if (manifest.station_plugin(i).empty()) continue;
     fs::copy_file(objects[next++], to / (manifest.station_plugin(i) + ".so"), fs::copy_options::overwrite_existing);
     for (const std::string& source : loaded.experiment.station().environment(i).plugin().source()) {
-      const fs::path from = loaded.resolve(source);
-      if (from.extension() != ".so") fs::copy_file(from, to / from.filename(), fs::copy_options::skip_existing);
+      const fs::path from = fs::weakly_canonical(loaded.resolve(source));
+      if (from.extension() != ".so" && copied.insert(from).second) fs::copy_file(from, free_name(to, from));
     }
   }
   fs::copy_file(objects[next], to / manifest.station_host(), fs::copy_options::overwrite_existing);
 }
 
-/// Copies the source files of the programs, for readers. Of two files with the same name from different folders, the second is
-/// called NAME-2. Throws filesystem_error.
+/// Copies the source files of the programs, for readers. Throws filesystem_error.
 void copy_sources(const LoadedExperiment& loaded, const fs::path& to) {
   std::set<fs::path> copied;
   for (const proto::RobotGroup& group : loaded.experiment.robots()) {
     for (const std::string& name : group.behaviour()) {
       const fs::path source = fs::weakly_canonical(loaded.resolve(name));
-      if (!copied.insert(source).second) continue;
-      fs::path copy = to / source.filename();
-      for (int number = 2; fs::exists(copy); ++number)
-        copy = to / fmt::format("{}-{}{}", source.stem().string(), number, source.extension().string());
-      fs::copy_file(source, copy);
+      if (copied.insert(source).second) fs::copy_file(source, free_name(to, source));
     }
   }
 }

@@ -8,7 +8,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <thread>
 
 #include "clients/cli/commands.hpp"
 #include "clients/cli/prepare.hpp"
@@ -20,6 +19,7 @@
 #include "core/os/interrupt.hpp"
 #include "core/os/limits.hpp"
 #include "core/os/precedence.hpp"
+#include "core/os/worker_pool.hpp"
 #include "services/ark/station_service.hpp"
 #include "services/behaviours/behaviours_service.hpp"
 #include "services/comm/firmware/firmware_swarm.hpp"
@@ -142,9 +142,8 @@ int serve(const ServiceArguments& arguments) {
     physics::run_service(plan, partition, context);
   } else if (arguments.service == "comm") {
     begin_log(plan, plan.radio(), arguments.transport);
-    const std::uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
     comm::run_service(plan, context,
-                      firmware::make_firmware_robots(plan, directory.path(), threads, context.first(), true));
+                      firmware::make_firmware_robots(plan, directory.path(), os::cores(), context.first(), true));
   } else if (arguments.service == "behaviours") {
     const HostId host = parse_share(arguments.share, plan.hosts);
     begin_log(plan, plan.behaviours(host), arguments.transport);

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
-#include <thread>
 
 #include "clients/cli/commands.hpp"
 #include "clients/cli/observable_choice.hpp"
@@ -20,6 +19,7 @@
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/os/interrupt.hpp"
+#include "core/os/worker_pool.hpp"
 
 namespace kilotwin::cli {
 namespace {
@@ -156,7 +156,7 @@ void print_results(const SweepArguments& arguments, const Sweep& sweep, const Sw
 }
 
 int sweep(const SweepArguments& arguments) {
-  const std::uint32_t cores = std::max(1u, std::thread::hardware_concurrency());
+  const std::uint32_t cores = os::cores();
   warn_beyond_cores("--jobs", arguments.jobs);
   Sweep sweep = checked(arguments);
   sweep.fallback = fs::path("runs") / (sweep.name + "-sweep");

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 /// Slurm's default MaxArraySize is 1001; beyond it, an element does several runs.
 constexpr std::size_t kMostElements = 1000;
-constexpr auto kPoll = std::chrono::seconds(1);
+constexpr auto kQueuePoll = std::chrono::seconds(1);
 
 fs::path required_tool(const char* name) {
   const fs::path tool = os::find_executable(name);
@@ -113,7 +113,7 @@ bool run_on_slurm(std::vector<SweepRun>& runs, const fs::path& directory, const 
       progress.show(static_cast<double>(done) / static_cast<double>(runs.size()),
                     fmt::format("{} of {} runs done by Slurm", done, runs.size()));
     }
-    std::this_thread::sleep_for(kPoll);
+    std::this_thread::sleep_for(kQueuePoll);
   }
   progress.clear();
   for (SweepRun& run : runs) {

@@ -14,7 +14,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Why a parameter has no counterpart; empty: not worth a word.
+/// Why a parameter has no counterpart; empty: none is reported.
 const std::map<std::string, std::string>& reasons() {
   static const std::map<std::string, std::string> all{
       {"timeStep", "a tick is 32.768 ms, the firmware's own"},

@@ -15,7 +15,7 @@
 namespace kilotwin::importers {
 namespace {
 
-/// Why a key of the top level or of an object has no counterpart; empty: not worth a word.
+/// Why a key of the top level or of an object has no counterpart; empty: none is reported.
 const std::map<std::string, std::string>& reasons() {
   static const std::map<std::string, std::string> all{
       {"time_step", "a tick is 32.768 ms, the firmware's own"},

@@ -35,7 +35,7 @@ class XmlSource {
   /// A remark about an element.
   void note(pugi::xml_node node, const std::string& remark);
   /// All remarks, and one for each element and attribute that nobody read, in the order of lines. `reasons` by "element",
-  /// "element@attribute" or "@attribute"; an empty reason: not worth a word.
+  /// "element@attribute" or "@attribute"; an empty reason: none is reported.
   [[nodiscard]] std::vector<std::string> notes(const std::map<std::string, std::string>& reasons);
 
  private:

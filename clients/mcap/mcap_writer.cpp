@@ -1,8 +1,8 @@
 #include "clients/mcap/mcap_writer.hpp"
 
-#include <zlib.h>
-
 #include <algorithm>
+
+#include "core/os/crc32.hpp"
 
 namespace kilotwin::mcap {
 namespace {
@@ -56,11 +56,6 @@ template <class Map> Content& add_map(Content& to, const Map& map) {
   Content entries;
   for (const auto& [key, value] : map) entries.number(key).number(value);
   return to.text(entries.bytes());
-}
-
-std::uint32_t crc_of(std::string_view bytes, std::uint32_t before = 0) {
-  return static_cast<std::uint32_t>(
-      ::crc32_z(before, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
 }
 
 }  // namespace
@@ -122,7 +117,7 @@ void McapWriter::end_chunk() {
           .number(chunk_first_)
           .number(chunk_last_)
           .number(index.size)
-          .number(crc_of(chunk_))
+          .number(os::crc32(chunk_))
           .text("")
           .number(index.size)
           .raw(chunk_)
@@ -197,7 +192,7 @@ void McapWriter::close() {
                                  .raw(footer.bytes())
                                  .bytes();
   put(summary);
-  put(Content().raw(before).number(crc_of(before, crc_of(summary))).bytes());
+  put(Content().raw(before).number(os::crc32(before, os::crc32(summary))).bytes());
   put(kMagic);
   output_.close();
 }

@@ -133,7 +133,7 @@ std::optional<News> Observer::take_news() {
     state_.reset();
     earlier_.reset();
     waiting_since_ = Clock::now();
-    told_ = false;
+    said_ = false;
     return News::kRunEnded;
   }
   if (begun_) {
@@ -161,15 +161,15 @@ News Observer::wait(std::chrono::milliseconds patience) {
   for (;;) {
     if (const std::optional<News> news = take_news()) return *news;
     const auto now = Clock::now();
-    if (!run_ && !told_ && now >= waiting_since_ + kSayAfter) {
-      told_ = true;
+    if (!run_ && !said_ && now >= waiting_since_ + kSayAfter) {
+      said_ = true;
       lock.unlock();
       say_that_none_is_there();
       lock.lock();
       continue;
     }
     if (now >= until) return News::kNothing;
-    const auto wake = !run_ && !told_ ? std::min(until, waiting_since_ + kSayAfter) : until;
+    const auto wake = !run_ && !said_ ? std::min(until, waiting_since_ + kSayAfter) : until;
     arrived_.wait_until(lock, wake);
   }
 }

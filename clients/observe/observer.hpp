@@ -94,7 +94,7 @@ class Observer {
   std::optional<RunFacts> run_;
   std::unique_ptr<SwarmAt> state_, earlier_;
   std::chrono::steady_clock::time_point waiting_since_;
-  bool told_ = false;
+  bool said_ = false;
 
   dds::Participant participant_;
   std::unique_ptr<dds::Reader<PublicRunDescription>> descriptions_;

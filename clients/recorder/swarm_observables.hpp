@@ -1,7 +1,7 @@
 /// SwarmObservables: the observables that an experiment names, evaluated state by state.
 ///
 /// Names per robot: x_mm, y_mm, heading_rad, displacement_mm (distance from the first recorded position), led (a colour), led_r, led_g,
-/// led_b (0..3), state (a life cycle), failed (0 or 1), group, robot, and every recorded variable, which has its last value. Single
+/// led_b (0..3), state (a life cycle), failed (0 or 1), group, robot. So is every recorded variable, with its last value. Single
 /// ones: time_s; the colours off, red, green, yellow, blue, magenta, cyan, white; the life cycles sleeping, idle, setup, running...;
 /// and the observables of observables.hpp: msd, spread, nearest...
 #pragma once

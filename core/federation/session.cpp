@@ -13,6 +13,7 @@
 #include "core/federation/hash_sums.hpp"
 #include "core/federation/likely_cause.hpp"
 #include "core/os/interrupt.hpp"
+#include "core/os/worker_pool.hpp"
 
 namespace kilotwin {
 namespace {
@@ -118,7 +119,7 @@ void Session::beat(const std::stop_token& stop) {
 
 double Session::patience_s() const {
   if (!started_) return kStartPatience_s;
-  const double cores = std::max(1u, std::thread::hardware_concurrency());
+  const double cores = os::cores();
   return std::clamp(dds::kSilence_s * plan_.federates() / (kServicesPerCore * cores), dds::kSilence_s,
                     kStartPatience_s);
 }

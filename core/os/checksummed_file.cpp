@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <unistd.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -12,6 +11,7 @@
 #include <system_error>
 
 #include "core/base/error.hpp"
+#include "core/os/crc32.hpp"
 
 namespace kilotwin {
 namespace {
@@ -32,16 +32,11 @@ std::uint64_t get(std::string_view from, std::size_t at, std::size_t bytes) {
   return value;
 }
 
-std::uint32_t crc_of(std::string_view bytes, std::uint32_t before = 0) {
-  return static_cast<std::uint32_t>(
-      ::crc32_z(before, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
-}
-
 /// The CRC covers the block's number too, so that exchanged blocks are detected.
 std::uint32_t crc_of_block(std::uint64_t number, std::string_view content) {
   std::string prefix;
   put(prefix, number, 8);
-  return crc_of(content, crc_of(prefix));
+  return os::crc32(content, os::crc32(prefix));
 }
 
 std::uint64_t blocks_of(std::uint64_t length) {
@@ -57,7 +52,7 @@ void write_checksummed(const fs::path& file, const FileKind& kind, std::string_v
   put(bytes, kind.format, 4);
   put(bytes, kBlock_bytes, 4);
   put(bytes, content.size(), 8);
-  put(bytes, crc_of(bytes), 4);
+  put(bytes, os::crc32(bytes), 4);
   for (std::uint64_t number = 0; !content.empty(); ++number) {
     const std::string_view block = content.substr(0, kBlock_bytes);
     bytes += block;
@@ -95,7 +90,7 @@ std::string read_checksummed(const fs::path& file, const FileKind& kind) {
   }
   const std::string_view all = bytes;
   if (all.size() < kHeader_bytes) throw refuse(fmt::format("is cut off at octet {}", all.size()));
-  if (get(all, kHeader_bytes - kCrc_bytes, 4) != crc_of(all.substr(0, kHeader_bytes - kCrc_bytes)))
+  if (get(all, kHeader_bytes - kCrc_bytes, 4) != os::crc32(all.substr(0, kHeader_bytes - kCrc_bytes)))
     throw refuse("is damaged at octet 0");
   if (const std::uint64_t format = get(all, kMagic_bytes, 4); format != kind.format)
     throw refuse(fmt::format("is of format {}; this program reads format {}", format, kind.format));

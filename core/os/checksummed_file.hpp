@@ -8,7 +8,7 @@
 ///   crc      u32, CRC-32 (IEEE 802.3) of the 24 octets above
 ///   blocks   each min(kBlock_bytes, remaining octets) of content, then u32, the CRC-32 of the block's number (u64) and content
 ///
-/// With blocks of 8 KiB, CRC-32 detects every change of up to three bits within a block and every burst of up to 32 bits
+/// With blocks of 8 KiB, CRC-32 detects every change of up to three bits within a block. It detects every burst of up to 32 bits
 /// (Koopman 2002, "32-Bit Cyclic Redundancy Codes for Internet Applications"). Any other change of a block goes unnoticed
 /// with probability 2^-32.
 #pragma once

@@ -20,7 +20,11 @@ constexpr int kYields = 8;
 
 }  // namespace
 
-std::uint32_t cores() { return std::max(1u, std::thread::hardware_concurrency()); }
+std::uint32_t cores() {
+  cpu_set_t allowed;
+  if (sched_getaffinity(0, sizeof allowed, &allowed) == 0) return static_cast<std::uint32_t>(CPU_COUNT(&allowed));
+  return std::max(1u, std::thread::hardware_concurrency());  // a machine of more than 1024 processors
+}
 
 WorkerPool::WorkerPool(std::uint32_t threads) : spins_(threads <= cores() ? kSpins : 0) {
   try {

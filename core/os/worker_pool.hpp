@@ -12,7 +12,8 @@
 
 namespace kilotwin::os {
 
-/// Processors that this process may use, at least 1.
+/// Processors that the calling thread may use, at least 1: those of the machine without what `taskset`, a cpuset or a job of Slurm
+/// withholds.
 [[nodiscard]] std::uint32_t cores();
 
 /// Between two calls the threads spin for some tens of us before they sleep, because waking a thread costs as much as several
@@ -46,8 +47,8 @@ class WorkerPool {
   const Task* task_ = nullptr;
   std::size_t count_ = 0;
 
-  /// Number of tasks that no thread has taken, or kEnd. The thread that lowers it from n to n - 1 takes task count_ - n. The
-  /// current call cannot end before that task is done, so a thread that slept through calls still reads the right task_.
+  /// Number of tasks that no thread has taken, or kEnd. The thread that lowers it from n to n - 1 takes task
+  /// (count_ - n). The current call cannot end before that task is done, so a thread that slept through calls still reads the right task_.
   std::atomic<std::uint32_t> unclaimed_{0};
   std::atomic<std::uint32_t> unfinished_{0};
   std::mutex failure_mutex_;

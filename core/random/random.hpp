@@ -34,7 +34,7 @@ enum class Stream : std::uint16_t {
   kConverter = 35,         ///< noise of a firmware robot's analogue converter; tick: its conversions / 2^16
 };
 
-/// Philox4x32 with 10 rounds. Multipliers and key increments are those of the paper (the increments: the golden ratio and
+/// Philox4x32 with 10 rounds. Multipliers and key increments are those of Salmon et al. (SC 2011; the increments: the golden ratio and
 /// the square root of 3, less 1, times 2^32).
 [[nodiscard]] constexpr std::array<std::uint32_t, 4> philox4x32(std::array<std::uint32_t, 4> counter,
                                                                 std::array<std::uint32_t, 2> key) {

@@ -11,8 +11,8 @@
 
 namespace kilotwin::senses {
 
-/// ADC reading, counts, of a battery voltage. The full range of 1024 counts is 6 V: a divider by two before a converter with a
-/// reference of 3 V. With this range the firmware's thresholds 682, 648 and 614 are 4.0, 3.8 and 3.6 V to the count.
+/// ADC reading, counts, of a battery voltage. The full range of 1024 counts is 6 V: 3 V is the
+/// converter's reference, behind a divider by two. With this range the firmware's thresholds 682, 648 and 614 are 4.0, 3.8 and 3.6 V to the count.
 [[nodiscard]] constexpr double voltage_reading(double volts) { return volts * (1024 / 6.0); }
 
 /// Open-circuit voltage of a lithium-ion cell, V, at state of charge 0..1: a generic discharge curve, piecewise linear.

@@ -8,7 +8,7 @@
 namespace kilotwin::senses {
 namespace {
 
-/// Reading of the processor's temperature sensor, counts, with a reference of 1.1 V. The data sheet of the ATmega328P gives
+/// Reading of the processor's temperature sensor, counts. The converter's reference has 1.1 volts. The data sheet of the ATmega328P gives
 /// 242 mV at -45, 314 mV at 25 and 380 mV at 85 degrees Celsius.
 double temperature_reading(double celsius) {
   const double mV = 314 + (celsius - 25) * (celsius < 25 ? 72.0 / 70 : 66.0 / 60);

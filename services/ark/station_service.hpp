@@ -1,5 +1,5 @@
-/// The station as a federate, and with it the run's one ingress and its metrics: it stamps external input, adds up
-/// the state hash and the counters of all federates, tells observers how the run goes, and is the only one that sees the
+/// The station as a federate, and with it the run's one ingress and its metrics: it stamps external input; it adds up
+/// the state hash and the counters of all federates; it tells observers how the run goes. It is the only one that sees the
 /// complete state of every tick, which it hands to the run's observer (the recorder).
 #pragma once
 

@@ -155,8 +155,8 @@ void TrackerInput::watch(Source& source, const Waiting& waiting) {
           source.name, source.restarts));
     }
   }
-  if (source.clock.wrong_utc_s() == 0 || source.told_utc) return;
-  source.told_utc = true;
+  if (source.clock.wrong_utc_s() == 0 || source.said_wrong_utc) return;
+  source.said_wrong_utc = true;
   const double ahead_s = source.clock.wrong_utc_s();
   const bool is_tai = std::abs(ahead_s - ClockModel::kTaiLead_s) < 1;
   say(fmt::format(

@@ -43,7 +43,7 @@ class TrackerInput {
     LatencyHistogram own, way;  ///< exposure to writing, where the source tells it; writing to arrival
     std::uint64_t frames = 0, dropped = 0, last_frame = 0;
     std::uint32_t restarts = 0;
-    bool told_utc = false;
+    bool said_wrong_utc = false;
   };
   struct Waiting {
     std::uint32_t source;

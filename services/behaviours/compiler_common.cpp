@@ -107,8 +107,8 @@ std::optional<std::string> assembler_error(std::string_view line) {
   return std::string(place) + ":1: error: " + std::string(line.substr(at + kMark.size()));
 }
 
-/// Whether a line of gcc, collect2 or clang (C locale) reports that one of its own processes was killed, ran out of memory or disk
-/// space, or had an internal error.
+/// Whether a line of gcc, collect2 or clang (C locale) reports a failure of one of its own processes: it was killed, ran out of
+/// memory or disk space, or had an internal error.
 bool is_machine_failure(std::string_view line) {
   for (const std::string_view mark :
        {"signal terminated program", "terminated with signal", "internal compiler error",

@@ -165,17 +165,32 @@ struct FoundHeader {
   std::vector<fs::path> others;  ///< of the same name, in the same folder or below it
 };
 
+/// files_below(), which lists each folder once.
+class Listings {
+ public:
+  const std::vector<fs::path>& files_below(const fs::path& folder) {
+    const auto [listing, is_new] = known_.try_emplace(folder);
+    if (is_new) listing->second = behaviours::files_below(folder);
+    return listing->second;
+  }
+
+ private:
+  std::map<fs::path, std::vector<fs::path>> known_;
+};
+
 /// Finds a header that a makefile's -I would find, or nothing. Of several the nearest: the one with the shortest path from the
 /// file that includes it.
-std::optional<FoundHeader> header_around(const fs::path& includer, const std::string& name) {
+std::optional<FoundHeader> header_around(const fs::path& includer, const std::string& name, Listings& listings) {
   const fs::path from = normal(includer).parent_path();
   const auto steps = [&](const fs::path& to) {
     const fs::path way = to.lexically_relative(from);
     return std::distance(way.begin(), way.end());
   };
   for (const fs::path& folder : folders_around(includer)) {
-    std::vector<fs::path> candidates = files_below(folder);
-    std::erase_if(candidates, [&](const fs::path& file) { return !file.string().ends_with("/" + name); });
+    std::vector<fs::path> candidates;
+    for (const fs::path& file : listings.files_below(folder)) {
+      if (file.native().ends_with("/" + name)) candidates.push_back(file);
+    }
     if (candidates.empty()) continue;
     std::stable_sort(candidates.begin(), candidates.end(),
                      [&](const fs::path& a, const fs::path& b) { return steps(a) < steps(b); });
@@ -259,7 +274,7 @@ class Preparation {
       return normal(copy) == target ? "" : '"' + copy.string() + '"';
     }
     if (is_runtime_header(include.name)) return "";
-    const std::optional<FoundHeader> found = header_around(file, named.lexically_normal().string());
+    const std::optional<FoundHeader> found = header_around(file, named.lexically_normal().string(), listings_);
     if (!found) return "";
     std::string text = found->path.string() + ": found for #include " +
                        (include.quoted ? '"' + include.name + '"' : '<' + include.name + '>');
@@ -283,6 +298,7 @@ class Preparation {
 
   ProgramText& result_;
   fs::path cache_;
+  Listings listings_;
   std::map<fs::path, fs::path> done_;
 };
 
@@ -372,7 +388,8 @@ std::vector<fs::path> sources_with(const std::set<std::string>& missing, const P
     if (!std::regex_search(code, kMain) && !take(candidate, code)) without.push_back(candidate);
   }
   if (!result.empty()) return result;
-  // Names that macros assemble appear only in preprocessed text.
+  // Names that macros assemble appear only in preprocessed text. Of files of another language they would be other names.
+  std::erase_if(without, [&](const fs::path& file) { return is_cpp(file) != is_cpp(text.sources.front()); });
   constexpr std::size_t kMostFiles = 100;
   if (without.size() > kMostFiles) without.resize(kMostFiles);
   for (const fs::path& candidate : without) {

@@ -24,8 +24,8 @@ struct ScalarVariable {
 inline constexpr std::size_t kMostScalars = 1024;
 
 /// The scalars of which the variable consists. Empty if the program has no variable of that name. Throws UserError, a line
-/// without a place, if the path does not fit the variable's type, the name is ambiguous, the compiler keeps the variable nowhere, or
-/// there are more than kMostScalars.
+/// without a place, if the path does not fit the variable's type, or the name is ambiguous; if the compiler keeps the variable nowhere,
+/// or there are more than kMostScalars.
 [[nodiscard]] std::vector<ScalarVariable> find_variable(const std::string& elf, const VariablePath& path);
 
 /// Names of the global and static variables of the program's own sources, ascending.

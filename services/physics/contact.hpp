@@ -1,8 +1,8 @@
 /// Planar contact: discs, movable bodies, obstacles and walls. docs/explanation/contact.md states the mechanics.
 ///
 /// Kilobots are quasi-static: thrust is limited, and ground friction decides. Let w be the velocity of a robot's drive. The
-/// ground holds a driven robot to w with a force of at most the thrust F. It holds a resting robot to velocity 0 with at
-/// most friction x mass x g. A contact has an impulse f along its normal n and a friction impulse h along its tangent t; both
+/// ground holds a driven robot to w with at most the thrust F; it holds a resting robot to velocity 0 with at
+/// most its friction times its weight. A contact has an impulse f along its normal n and a friction impulse h along its tangent t; both
 /// persist from tick to tick. A tick has S sub-steps. All bodies start a sub-step from the same state (Jacobi):
 ///   normal   f <- max(0, f + gain (closing - kEase max(0, gap - touch)))   closing: speed from extrapolated velocities
 ///   tangent  h <- clamp(h + gain sliding, -friction f, friction f)         sliding: relative speed of two rims, with turns

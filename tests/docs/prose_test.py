@@ -57,6 +57,23 @@ class Sentences(unittest.TestCase):
         self.assertEqual(lengths('He said "stop." (Then he left.) Nobody moved.'), [3, 3, 2])
 
 
+class CommentsOfSources(unittest.TestCase):
+    SOURCE = ("/// One two three: four; five.\n///   a layout line\n// six seven\nint x = 0;  // not counted\n"
+              "#include <x>\n  // eight nine ten.\n")
+
+    def test_are_counted_line_by_line(self):
+        found = [(line, len(words)) for line, words in prose.sentences(prose.comments(self.SOURCE), ".!?:;")]
+        self.assertEqual(found, [(1, 3), (1, 1), (1, 1), (3, 2), (6, 3)])
+
+    def test_have_short_sentences(self):
+        with tempfile.TemporaryDirectory() as folder:
+            source = pathlib.Path(folder) / "source.hpp"
+            source.write_text("// " + "word " * 31 + ".\n", encoding="utf-8")
+            outcome = subprocess.run([SCRIPT, source], capture_output=True, text=True, check=False)
+        self.assertEqual(outcome.returncode, 1)
+        self.assertIn("source.hpp:1: a sentence of 31 words", outcome.stdout)
+
+
 class LeftOut(unittest.TestCase):
     def test_fenced_code(self):
         self.assertEqual(lengths("One.\n```c\nint not; counted. At all.\n```\nTwo three.\n"), [1, 2])

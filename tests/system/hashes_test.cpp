@@ -10,7 +10,7 @@
 namespace kilotwin::test {
 namespace {
 
-/// The state hash of disperse with 100 robots and 10 s. It changes only with a change of a model, and is the same for every
+/// The state hash of disperse with 100 robots and 10 s. It changes only with a change of a model. It is the same for every
 /// compiler, optimisation level and sanitizer.
 constexpr std::uint64_t kGolden = 0xad091ef4a79041e3;
 

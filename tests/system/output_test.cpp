@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <set>
 
 #include "tests/system/program.hpp"
 
@@ -111,10 +112,33 @@ TEST_F(Output, ProgramsOfOneNameFromDifferentFoldersAreBothKept) {
   EXPECT_EQ(kept[1], read(scratch / "b/walk.c"));
 }
 
+TEST_F(Output, PluginsOfOneNameFromDifferentFoldersAreBothKept) {
+  for (const std::string folder : {"a", "b"}) {
+    fs::create_directory(scratch / folder);
+    write(scratch / (folder + "/empty.cpp"),
+          "#include <kilotwin_station.hpp>\nstruct Empty : KilobotExperiment {  // " + folder +
+              "\n  void initialise(bool) override {}\n  void serialize(Archive&) override {}\n};\n"
+              "extern \"C\" KilobotExperiment* createExpt() { return new Empty; }\n");
+  }
+  write(scratch / "e.txtpb",
+        "duration_s: 1\nrobots { count: 1 behaviour: \"idle.c\" layout { grid {} } }\nstation {\n"
+        "  environment { plugin { source: \"a/empty.cpp\" } }\n  environment { plugin { source: \"b/empty.cpp\" } "
+        "}\n}\n");
+  write(scratch / "idle.c",
+        "#include <kilolib.h>\nvoid setup(void) {}\nvoid loop(void) {}\n"
+        "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
+  run({scratch / "e.txtpb", "--mode", "local"}, scratch, "run");
+  std::set<std::string> kept;
+  for (const auto& entry : fs::directory_iterator(scratch / "run/plugins")) {
+    if (entry.path().extension() == ".cpp") kept.insert(read(entry.path()));
+  }
+  EXPECT_EQ(kept, (std::set<std::string>{read(scratch / "a/empty.cpp"), read(scratch / "b/empty.cpp")}));
+}
+
 TEST_F(Output, MoreThreadsThanCoresAreWarnedOf) {
   const Outcome outcome = brief_run({"--threads", "200", "--quiet"});
   EXPECT_EQ(outcome.status, 0);
-  EXPECT_NE(outcome.err.find("--threads 200: this machine has"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("--threads 200: this process may use"), std::string::npos) << outcome.err;
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
 }
 

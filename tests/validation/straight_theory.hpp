@@ -1,6 +1,6 @@
 /// Closed form of the mean square displacement of robots that drive straight, each with constant biases of its wheels.
 ///
-/// With wheel speeds v0 + b_left and v0 + b_right, b ~ N(mean, sd) and independent, wheels B apart, the speed of the
+/// Wheels that are B apart have the speeds v0 + b_left and v0 + b_right, with independent b ~ N(mean, sd). The speed of the
 /// reference point v = v0 + (b_left + b_right) / 2 and the turn rate w = (b_right - b_left) / B are independent:
 ///   v ~ N(v0 + mean, sd^2 / 2),   w ~ N(0, s^2), s = sqrt(2) sd / B.
 /// The reference point runs on an arc, and the disc's centre lies the axle offset a ahead of it. In the complex plane, from a

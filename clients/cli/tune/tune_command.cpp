@@ -3,7 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <memory>
-#include <thread>
 
 #include "clients/cli/commands.hpp"
 #include "clients/cli/observable_choice.hpp"
@@ -15,6 +14,7 @@
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/os/interrupt.hpp"
+#include "core/os/worker_pool.hpp"
 
 namespace kilotwin::cli {
 namespace {
@@ -71,7 +71,7 @@ std::string checked_name(const Measurement& measurement, const Goal& goal, std::
 }
 
 int tune_experiment(const TuneArguments& arguments) {
-  const std::uint32_t cores = std::max(1u, std::thread::hardware_concurrency());
+  const std::uint32_t cores = os::cores();
   warn_beyond_cores("--jobs", arguments.jobs);
   TuneResult result;
   result.parameters = parameters_of(arguments);

@@ -18,8 +18,8 @@ std::int64_t utc_ns() {
 }  // namespace
 
 std::optional<Snapshots::Snapshot> Snapshots::taken() {
-  if (told_ || never_seen_ > 0) return std::nullopt;
-  told_ = true;
+  if (was_returned_ || never_seen_ > 0) return std::nullopt;
+  was_returned_ = true;
   return Snapshot{time_s_, poses_};
 }
 
@@ -30,12 +30,12 @@ std::optional<Snapshots::Snapshot> Snapshots::add(const PublicRobotState& sample
     seen_at_s_.assign(poses_.size(), std::nullopt);
     never_seen_ = poses_.size();
     at_this_time_ = 0;
-    told_ = false;
+    was_returned_ = false;
     run_ = sample.run;
   } else if (sample.time_s > time_s_) {
     complete = taken();
     at_this_time_ = 0;
-    told_ = false;
+    was_returned_ = false;
   }
   time_s_ = sample.time_s;
   std::optional<double>& seen_at_s = seen_at_s_[sample.robot];

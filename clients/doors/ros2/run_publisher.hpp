@@ -35,7 +35,7 @@ class Snapshots {
   std::uint64_t run_ = 0;
   double time_s_ = -1;
   std::size_t never_seen_ = 0, at_this_time_ = 0;
-  bool told_ = true;  ///< the snapshot of this time was returned
+  bool was_returned_ = true;  ///< the snapshot of this time was returned
 };
 
 class RunPublisher {

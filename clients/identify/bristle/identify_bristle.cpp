@@ -269,7 +269,7 @@ Identified identify_bristle(std::vector<BristleRun> train, std::vector<BristleRu
   };
 
   // Forward selection: adds the effect with the largest reduction of the cross-validated error, as long as it
-  // exceeds three standard errors over runs (false alarm rate below 1 in 100 over six tests).
+  // exceeds three standard errors over runs. Then less than 1 in 100 sets has a false alarm, over six tests.
   BristleEffects on{};
   json effects = json::array(), rejected = json::array(), steps = json::array();
   std::vector<BristleEffect> order;

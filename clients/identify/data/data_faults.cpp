@@ -165,8 +165,8 @@ void exclude_frozen(MeasuredSet& set, std::vector<DataFault>& faults) {
 
 namespace {
 
-// A position is an outlier if it deviates from the extrapolation from before, the extrapolation from after, and
-// the interpolation, each by this many robust standard deviations of that distance in the run. The speeds towards
+// A position is an outlier if it deviates from three predictions: the extrapolation from before, that from after, and
+// the interpolation. Each distance must be this many of its robust standard deviations in the run. The speeds towards
 // it and away from it must also exceed the 95th percentile of speeds by this factor.
 constexpr double kOutlierSds = 12;
 constexpr double kLeastOutlier_mm = 6;

@@ -224,10 +224,10 @@ void Fitter::fit_contacts(FitState& state) const {
   MotionModel& model = state.model;
   if (model.walls_uncertain) resolve_walls(state);
   // Large contact noise would hide wrong positions of the walls.
-  const Noise anew;
+  const Noise initial;
   for (double Noise::*const part :
        {&Noise::wall_mm2_s, &Noise::wall_rad2_s, &Noise::contact_mm2_s, &Noise::contact_rad2_s})
-    model.noise.*part = anew.*part;
+    model.noise.*part = initial.*part;
   // A missing effect may have looked like a displaced disc centre. With headings, effects of the camera alone do.
   if (!headings_ || model.measures()) fit_disc_centre(state);
   for (int round = 0; round < (headings_ ? 1 : 2); ++round) {

@@ -42,8 +42,8 @@ class Fitter {
   void fit_disc_centre(FitState&) const;
   /// Fits walls by likelihood. Without headings, positions alone do not show them.
   void fit_walls(FitState&) const;
-  /// Sets the lag between the stamps of commands and the robots' motion to its most likely value, if that is more likely
-  /// than the present one by a clear margin, and by `least_gain`. Returns the gain in log likelihood of all tracks, 0 without
+  /// Sets the lag between the stamps of commands and the robots' motion to its most likely value. That value must be
+  /// more likely than the present one by a clear margin, and by `least_gain`. Returns the gain in log likelihood of all tracks, 0 without
   /// a change.
   double fit_command_lag(FitState&, double least_gain = 0) const;
   /// Log likelihood of the tracks of the fit, without measurements after contacts.

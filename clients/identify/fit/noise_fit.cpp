@@ -283,11 +283,11 @@ Noise most_likely_noise(const MotionModel& start, const std::vector<const TrackV
     constexpr double kNone_mm2 = 0.01, kNone_s = 1e-5;
     if (std::exp(at[kPosition]) < kNone_mm2 || std::exp(at[kFactor]) < kNone_s) {
       const NoiseVector middle = logs_of(Noise{});
-      NoiseVector anew = at;
-      anew[kFactor] = std::max(at[kFactor], middle[kFactor]);
-      anew[kDrift] = std::min(at[kDrift], std::log(1e-2));
-      anew[kPosition] = std::max(at[kPosition], std::log(0.1));
-      if (climb(anew) > value) at = anew;
+      NoiseVector start = at;
+      start[kFactor] = std::max(at[kFactor], middle[kFactor]);
+      start[kDrift] = std::min(at[kDrift], std::log(1e-2));
+      start[kPosition] = std::max(at[kPosition], std::log(0.1));
+      if (climb(start) > value) at = start;
     }
     model.noise = with(model.noise, variances(at));
     if ((at - before).cwiseAbs().maxCoeff() < kSettled) break;

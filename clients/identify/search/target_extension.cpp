@@ -69,8 +69,9 @@ void with_constant(Basis& basis) {
     basis.factors.front().first = 0;
 }
 
-/// Headings that are measured in a bent picture: to first order each is off by a(x, y) + b(x, y) cos 2h + c(x, y) sin 2h,
-/// with the heading h and maps that follow from the derivatives of the distortion.
+/// Headings that are measured in a bent picture. To first order, a heading h is off by
+///   a(x, y) + b(x, y) cos 2h + c(x, y) sin 2h
+/// with maps that follow from the derivatives of the distortion.
 Extension bent_directions(const Factor& map) {
   Factor place = map;
   place.known.clear();

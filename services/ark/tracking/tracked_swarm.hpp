@@ -5,7 +5,7 @@
 /// speed_change^2 per second. Samples enter by the Kalman update at their own instants. docs/explanation/tracking.md has
 /// the equations.
 ///
-/// The state at tick k holds the samples of the ticks before k. The frame of tick k is a function of that state and the
+/// The state at tick k holds the samples of the ticks before. The frame of tick k is a function of that state and the
 /// samples that were stamped for k; commit() makes both the state at k + 1. Pure.
 #pragma once
 

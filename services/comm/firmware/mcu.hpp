@@ -5,7 +5,7 @@
 /// which light arrives. It does not depend on how the time is divided into calls of run().
 ///
 /// Added here, because libsimavr 1.6 lacks them: conversions that the comparator starts, interrupt vectors in the boot section
-/// (IVSEL), program addresses that wrap at the end of the flash, power-down that stops all clocks but the watchdog's, and the
+/// (IVSEL); program addresses that wrap at the end of the flash, power-down that stops all clocks but the watchdog's, and the
 /// time that erasing and writing a page of flash takes.
 #pragma once
 

@@ -2,16 +2,33 @@
 #include "core/os/worker_pool.hpp"
 
 #include <gtest/gtest.h>
+#include <sched.h>
 
 #include <atomic>
 #include <cstdint>
 #include <numeric>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace kilotwin::os {
 namespace {
+
+TEST(Cores, AreThoseThatTheThreadMayUse) {
+  cpu_set_t all;
+  ASSERT_EQ(sched_getaffinity(0, sizeof all, &all), 0);
+  EXPECT_EQ(cores(), static_cast<std::uint32_t>(CPU_COUNT(&all)));
+  std::thread([&] {
+    int processor = 0;
+    while (!CPU_ISSET(processor, &all)) ++processor;
+    cpu_set_t one;
+    CPU_ZERO(&one);
+    CPU_SET(processor, &one);
+    ASSERT_EQ(sched_setaffinity(0, sizeof one, &one), 0);
+    EXPECT_EQ(cores(), 1u);
+  }).join();
+}
 
 TEST(WorkerPool, RunsEachTaskOnceOnAnyNumberOfThreads) {
   for (const std::uint32_t threads : {0u, 1u, 2u, 3u, 8u}) {

@@ -235,7 +235,7 @@ TEST(Drive, AHalfStatedBiasKeepsTheDrawOfTheOtherWheel) {
   EXPECT_EQ(b.bias_right_mm_s(0), a.bias_right_mm_s(0));
 }
 
-TEST(Drive, BiasesFollowTheSeedsDistribution) {
+TEST(Drive, BiasesFollowTheDistributionOfTheArgosPaper) {
   constexpr std::uint32_t kRobots = 20000;
   const RunPlan plan = make_plan("arena { width_mm: 100000 height_mm: 100000 }",
                                  testing::grid_crowd(kRobots, 100, testing::Facing::kRight));

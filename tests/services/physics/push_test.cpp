@@ -125,7 +125,7 @@ TEST(Push, ARestingRobotYieldsToMoreThanItsFriction) {
 }
 
 TEST(Push, AnOffCentrePushTurnsTheBox) {
-  // Far from the centre, the moment decides: friction holds |f|^2 + (M / rho)^2 <= (mu m g)^2, so F moves the box if
+  // Far from the centre, the moment decides. Friction holds |f|^2 + (M / rho)^2 <= (mu m g)^2. So F moves the box if
   // F sqrt(1 + (d / rho)^2) > mu m g. For a square of 100 mm, rho is 38.26 mm.
   const double rho_mm = 100 * (std::sqrt(2.0) + std::log(1 + std::sqrt(2.0))) / 6, offset_mm = 40;
   const double ratio = std::sqrt(1 + std::pow(offset_mm / rho_mm, 2));
