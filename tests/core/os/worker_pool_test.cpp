@@ -5,6 +5,7 @@
 #include <sched.h>
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <numeric>
 #include <stdexcept>
@@ -20,7 +21,7 @@ TEST(Cores, AreThoseThatTheThreadMayUse) {
   ASSERT_EQ(sched_getaffinity(0, sizeof all, &all), 0);
   EXPECT_EQ(cores(), static_cast<std::uint32_t>(CPU_COUNT(&all)));
   std::thread([&] {
-    int processor = 0;
+    std::size_t processor = 0;
     while (!CPU_ISSET(processor, &all)) ++processor;
     cpu_set_t one;
     CPU_ZERO(&one);
