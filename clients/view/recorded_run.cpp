@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -23,8 +24,6 @@ namespace {
 
 using recorder::StateIndex;
 
-/// A trail has so many points at most, and reads so many bytes of states at most.
-constexpr std::size_t kTrailPoints = 400, kTrailBytes = 48'000'000, kStateBytesPerRobot = 26;
 /// A place that a tracker stated is shown for so long. Records that one answer reads at most.
 constexpr double kPlaceHolds_s = 1;
 constexpr std::size_t kMostSamples = 128;
@@ -193,19 +192,7 @@ std::string RecordedRun::floors_at(std::int64_t tick) {
 std::string RecordedRun::trail(std::uint32_t robot, std::int64_t tick) {
   const std::lock_guard lock(mutex_);
   if (robot >= reader_.header().robots()) return notice_text(fmt::format("There is no robot {}.", robot));
-  const std::size_t affordable =
-      std::clamp<std::size_t>(kTrailBytes / (kStateBytesPerRobot * reader_.header().robots()), 2, kTrailPoints);
-  const std::size_t last = index_.at_or_before(tick);
-  const std::size_t stride = last / affordable + 1;
-  std::vector<double> xy_mm;
-  // The last point is the state at the tick.
-  for (std::size_t number = last % stride; number <= last; number += stride) {
-    const proto::StateRecord* const at = state(number);
-    if (at == nullptr) continue;
-    xy_mm.push_back(at->x_mm(static_cast<int>(robot)));
-    xy_mm.push_back(at->y_mm(static_cast<int>(robot)));
-  }
-  return trail_text(robot, xy_mm);
+  return curves_.trail(robot, tick);
 }
 
 std::string RecordedRun::robot(std::uint32_t robot) {
@@ -337,26 +324,45 @@ std::vector<ShownPacket> RecordedRun::packets_until(std::int64_t tick) {
   return {newest_first.rbegin(), newest_first.rend()};
 }
 
+/// Calls take(event) for the records of a kind from a tick back to another one, until it returns false. An event's record is of the
+/// tick in which the packet ended. False: there are more.
+template <class Take>
+bool RecordedRun::each_event_back(std::uint32_t kind, std::int64_t from, std::int64_t tick, const Take& take) {
+  const std::vector<StateIndex::Entry>& all = index_.events(kind);
+  auto at = std::upper_bound(all.begin(), all.end(), tick,
+                             [](std::int64_t wanted, const auto& entry) { return wanted < entry.tick; });
+  for (std::size_t read = 0; at != all.begin(); ++read) {
+    if ((--at)->tick < from) return true;
+    if (read == kMostSamples) return false;
+    const proto::Record* const record = record_at(at->offset);
+    if (record != nullptr && record->has_event() && !take(record->event())) return false;
+  }
+  return true;
+}
+
 std::string RecordedRun::flights(std::int64_t from, std::int64_t tick) {
   const std::lock_guard lock(mutex_);
-  std::vector<Flight> flights;
-  std::size_t read = 0;
-  for (const proto::RecordedEvent kind : {proto::RECEIVED, proto::SENT}) {
-    const std::vector<StateIndex::Entry>& all = index_.events(kind);
-    // An event's record is of the tick in which the packet ended.
-    auto at = std::upper_bound(all.begin(), all.end(), tick,
-                               [](std::int64_t wanted, const auto& entry) { return wanted < entry.tick; });
-    for (; at != all.begin() && flights.size() < kMostFlights && read < kMostSamples; ++read) {
-      if ((--at)->tick < from) break;
-      const proto::Record* const record = record_at(at->offset);
-      if (record != nullptr && record->has_event()) add_flights(record->event(), reader_.tick_length(), flights);
-    }
+  // Each kind reads its own records, so that many of one kind hide none of the other.
+  constexpr std::array kKinds{proto::RECEIVED, proto::SENT};
+  std::array<std::vector<Flight>, kKinds.size()> of;
+  bool whole = true;
+  for (std::size_t k = 0; k < kKinds.size(); ++k) {
+    whole &= each_event_back(kKinds[k], from, tick, [&](const proto::EventRecord& event) {
+      add_flights(event, reader_.tick_length(), of[k]);
+      return of[k].size() <= kMostFlights;
+    });
+    std::erase_if(of[k], [from, tick](const Flight& flight) {
+      return !(flight.tick > static_cast<double>(from) && flight.tick <= static_cast<double>(tick));
+    });
   }
-  std::erase_if(flights, [from, tick](const Flight& flight) {
-    return !(flight.tick > static_cast<double>(from) && flight.tick <= static_cast<double>(tick));
-  });
-  const bool whole = flights.size() <= kMostFlights && read < kMostSamples;
-  if (flights.size() > kMostFlights) flights.resize(kMostFlights);
+  std::vector<Flight> flights;
+  const std::size_t least = kMostFlights / kKinds.size();
+  for (std::size_t k = 0; k < kKinds.size(); ++k) {
+    const std::size_t others = std::min(of[1 - k].size(), least);
+    const std::size_t count = std::min(of[k].size(), kMostFlights - others);
+    whole &= count == of[k].size();
+    flights.insert(flights.end(), of[k].begin(), of[k].begin() + static_cast<std::ptrdiff_t>(count));
+  }
   return flights_text({from, tick, static_cast<double>(tick), whole}, flights);
 }
 

@@ -52,6 +52,8 @@ class RecordedRun : public Answers {
  private:
   [[nodiscard]] const proto::StateRecord* state(std::size_t number);
   [[nodiscard]] const proto::Record* record_at(std::uint64_t offset);
+  template <class Take>
+  [[nodiscard]] bool each_event_back(std::uint32_t kind, std::int64_t from, std::int64_t tick, const Take& take);
   [[nodiscard]] std::vector<TrackedPlace> places_at(std::int64_t tick);
   [[nodiscard]] std::vector<ShownPacket> packets_until(std::int64_t tick);
 

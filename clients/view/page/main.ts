@@ -2,6 +2,7 @@
 import { Camera } from "./camera.ts";
 import { Connection } from "./connection.ts";
 import { Flights, FLOATS } from "./flights.ts";
+import { furthest, type Point } from "./geometry.ts";
 import { Labels } from "./labels.ts";
 import { showMarks } from "./marks.ts";
 import { Mover } from "./mover.ts";
@@ -11,7 +12,7 @@ import { Playback } from "./playback.ts";
 import { ellipsesOf, messageOf, showAlarms, showPackets } from "./outside.ts";
 import { Plots } from "./plots.ts";
 import { listenToPointer } from "./pointer.ts";
-import { kindsOf, lifeOf, LIFE_ABSENT, type Frame, type MarksText, type Message, type OutsideText, type RobotCounts, type Run, type Status, type WorkText } from "./protocol.ts";
+import { kindsOf, lifeOf, LIFE_ABSENT, type Frame, type MarksText, type Message, type OutsideText, type RobotCounts, type Run, type Status, type TrailText, type WorkText } from "./protocol.ts";
 import { Renderer, type Marks } from "./renderer.ts";
 import { svgOf } from "./svg.ts";
 import { Theme } from "./theme.ts";
@@ -26,6 +27,7 @@ const WORK_EVERY_MS = 1000;
 const MARKS_EVERY_MS = 1000;
 const TRAIL_EVERY_S = 1;
 const TRAIL_SEGMENTS = 30;
+const MOST_TRAIL_POINTS = 2000;
 /** Swarms larger than this begin without trails. */
 const MOST_TRAILS = 5000;
 /** Robots further than this from a click are not selected. */
@@ -39,7 +41,7 @@ class Page {
   readonly #picture = element<HTMLCanvasElement>("picture");
   readonly #line = element<HTMLInputElement>("line");
   readonly #camera = new Camera();
-  readonly #renderer = new Renderer(this.#picture);
+  #renderer = new Renderer(this.#picture);
   readonly #labels = new Labels(element<HTMLCanvasElement>("labels"));
   readonly #plots: Plots = new Plots({
     send: (request) => this.#connection.send(request),
@@ -62,7 +64,7 @@ class Page {
   #status: Status | undefined;
   #counts: RobotCounts | undefined;
   #selected: number | undefined;
-  #trail: [number, number][] = [];
+  #trail: Point[][] = []; // of the selected robot, in parts
   #program: { tick: number; askedAt: number } | undefined; // what was asked for last
   #outside: OutsideText | undefined;
   #ellipses: [number, number][][] = [];
@@ -73,6 +75,7 @@ class Page {
   #marksDue = true;
   #marksAsked = -Infinity;
   #mayTrail = 0; // when the trail of the selected robot may be asked for again
+  #trailTick = -1; // up to which it was asked for
   #trails = true;
   #trailFrom: Frame | undefined;
   #maySteer = false;
@@ -105,10 +108,18 @@ class Page {
 
   #connected(): void {
     showConnection("open");
-    const token = new URLSearchParams(location.hash.slice(1)).get("token") ?? sessionStorage.getItem("token");
-    if (!token) return;
-    sessionStorage.setItem("token", token);
-    this.#connection.send({ do: "hello", token });
+    this.#showToken();
+  }
+
+  /** The token leaves the address, which others may see; this tab remembers it, also when it is loaded again. */
+  #showToken(): void {
+    const given = new URLSearchParams(location.hash.slice(1)).get("token");
+    if (given) {
+      sessionStorage.setItem("token", given);
+      history.replaceState(null, "", location.pathname + location.search);
+    }
+    const token = sessionStorage.getItem("token");
+    if (token) this.#connection.send({ do: "hello", token });
   }
 
   #lost(): void {
@@ -159,10 +170,7 @@ class Page {
         return;
       case "floors": return this.#renderer.setFloors(message.floors);
       case "trail":
-        if (message.robot === this.#selected) {
-          this.#trail = [];
-          for (let i = 0; i + 1 < message.xy.length; i += 2) this.#trail.push([message.xy[i]!, message.xy[i + 1]!]);
-        }
+        if (message.robot === this.#selected) this.#takeTrail(message);
         return;
       case "robot":
         this.#counts = message;
@@ -171,7 +179,7 @@ class Page {
         this.#maySteer = message.steer;
         return this.#buttons();
       case "notice":
-        this.#mover.refused();
+        if (message.refuses === "place") this.#mover.refused();
         return notice(message.text);
     }
   }
@@ -226,6 +234,16 @@ class Page {
 
   // Drawing.
 
+  /** Nothing that the graphics memory held is there any more, except trails all of it is made again. */
+  #restorePicture(): void {
+    const { floors } = this.#renderer;
+    this.#renderer = new Renderer(this.#picture);
+    if (this.#run) this.#renderer.begin(this.#run, kindsOf(this.#run));
+    this.#renderer.setFloors(floors);
+    this.#shown = undefined;
+    this.#stale = true;
+  }
+
   #tick(now: number): void {
     requestAnimationFrame((next) => this.#tick(next));
     const seconds = Math.min(0.25, (now - this.#drawnAt) / 1000);
@@ -271,7 +289,7 @@ class Page {
   }
 
   #marks(selected: [number, number] | undefined): Marks {
-    const trail = selected && this.#trail.length > 0 ? [...this.#trail, selected] : [];
+    const trail = selected && this.#trail.length > 0 ? [...this.#trail.slice(0, -1), ...this.#goOn(this.#trail.at(-1)!, selected)] : [];
     const range = element<HTMLInputElement>("range").checked ? (this.#run?.radioRange ?? 0) : 0;
     const place = (robot: number): [number, number] => this.#placeOf(robot);
     const flying = this.#playback.current ? this.#flights.fill(this.#playback, place, this.#selected) : 0;
@@ -306,18 +324,47 @@ class Page {
       this.#renderer.forgetTrails();
       this.#trailFrom = frame;
     } else if (from && passed >= TRAIL_EVERY_S) {
-      if (this.#trails) this.#renderer.addTrailSegment(from, frame, TRAIL_SEGMENTS);
+      if (this.#trails) this.#renderer.addTrailSegment(from, frame, TRAIL_SEGMENTS, furthest(passed));
+      if (this.#playback.live && this.#selected !== undefined) this.#lengthenTrail(this.#placeOf(this.#selected));
       this.#trailFrom = frame;
-      if (this.#playback.live && this.#selected !== undefined) this.#trail.push(this.#placeOf(this.#selected));
-      if (this.#trail.length > 2000) this.#trail = this.#trail.filter((_, i) => i % 2 === 0);
     }
     if (!this.#playback.live) this.#askTrail();
+  }
+
+  /** The last part of a trail and a further place: two parts where the robot was placed elsewhere in between. */
+  #goOn(part: Point[], place: Point): Point[][] {
+    const [x, y] = part.at(-1)!;
+    const from = this.#trailFrom;
+    const passed = from && this.#shown ? Math.abs(this.#shown.tick - from.tick) * this.#run!.tickSeconds : 0;
+    const near = !this.#playback.live || Math.hypot(place[0] - x, place[1] - y) <= furthest(Math.max(TRAIL_EVERY_S, passed));
+    return near ? [[...part, place]] : [part, [place]];
+  }
+
+  #lengthenTrail(place: Point): void {
+    const last = this.#trail.pop();
+    this.#trail.push(...(last ? this.#goOn(last, place) : [[place]]));
+    if (this.#trail.reduce((sum, part) => sum + part.length, 0) <= MOST_TRAIL_POINTS) return;
+    // Every second point, and the ends of parts; of the parts, the newest.
+    this.#trail = this.#trail.slice(-MOST_TRAIL_POINTS / 4).map((part) => part.filter((_, i) => i % 2 === 0 || i === part.length - 1));
+  }
+
+  #takeTrail({ xy, whole }: TrailText): void {
+    this.#trail = [];
+    for (let i = 0; i + 1 < xy.length; i += 2) {
+      const [x, y] = [xy[i], xy[i + 1]];
+      if (x == null || y == null) this.#trail.push([]);
+      else if (this.#trail.length === 0) this.#trail.push([[x, y]]);
+      else this.#trail.at(-1)!.push([x, y]);
+    }
+    this.#trail = this.#trail.filter(({ length }) => length > 0);
+    if (!whole) setTimeout(() => this.#askTrail(), Math.max(0, this.#mayTrail - performance.now()));
   }
 
   #askTrail(): void {
     if (this.#selected === undefined || performance.now() < this.#mayTrail) return;
     this.#mayTrail = performance.now() + 500;
-    this.#connection.send({ do: "trail", robot: this.#selected, tick: Math.floor(this.#playback.time) });
+    this.#trailTick = Math.floor(this.#playback.time);
+    this.#connection.send({ do: "trail", robot: this.#selected, tick: this.#trailTick });
   }
 
   #askProgram(robot: number, tick: number, now: number): void {
@@ -367,6 +414,7 @@ class Page {
     if (this.#selected !== undefined) {
       showRobot(run, frame, this.#selected, this.#counts);
       this.#askProgram(this.#selected, Math.floor(time), now);
+      if (!this.#playback.live && this.#trailTick !== Math.floor(time)) this.#askTrail();
     }
     this.#askOutside(Math.floor(time), now);
     this.#askWork(now);
@@ -628,6 +676,13 @@ class Page {
       },
     });
     window.addEventListener("keydown", (event) => this.#key(event));
+    // A new address of the same page brings a new token.
+    window.addEventListener("hashchange", () => this.#showToken());
+    this.#picture.addEventListener("webglcontextlost", (event) => {
+      event.preventDefault(); // else the browser does not give it back
+      notice("The browser has taken the graphics memory away. The picture comes back by itself.");
+    });
+    this.#picture.addEventListener("webglcontextrestored", () => this.#restorePicture());
   }
 
   #key(event: KeyboardEvent): void {

@@ -165,6 +165,15 @@ export interface MarksText {
   marks: { tick: number; text: string }[];
 }
 
+/** Where a robot was, oldest first, x and y in turn, mm; null: it was placed elsewhere in between. */
+export interface TrailText {
+  type: "trail";
+  robot: number;
+  /** false: there is more, if it is asked for again. */
+  whole: boolean;
+  xy: (number | null)[];
+}
+
 export type Message =
   | FlightsText
   | WorkText
@@ -178,9 +187,10 @@ export type Message =
   | RobotCounts
   | { type: "extent"; lastTick: number; states: number }
   | { type: "floors"; floors: Floor[] }
-  | { type: "trail"; robot: number; xy: number[] }
+  | TrailText
   | { type: "grant"; steer: boolean }
-  | { type: "notice"; text: string };
+  /** `refuses`: the request that the run refuses; empty: it refuses none. */
+  | { type: "notice"; text: string; refuses: "place" | "" };
 
 /** The state of all robots at one tick: views into the message's own memory. */
 export interface Frame {

@@ -34,7 +34,8 @@ export interface Palette {
 /** What lies above the arena besides robots. */
 export interface Marks {
   selected: Point | undefined;
-  trail: Point[];
+  /** Where the selected robot was; parts, because it may have been placed elsewhere in between. */
+  trail: Point[][];
   range: number;
   /** Where tracked robots are with a probability of 95 %: rims. */
   ellipses: Point[][];
@@ -191,13 +192,15 @@ export class Renderer {
     this.#indexed = robots;
   }
 
-  /** Adds a segment to every robot's trail, and keeps the newest `keep`. */
-  addTrailSegment(from: Frame, to: Frame, keep: number): void {
+  /** Adds a segment to every robot's trail, and keeps the newest `keep`. Robots that moved further than `most`, mm, get none. */
+  addTrailSegment(from: Frame, to: Frame, keep: number, most: number): void {
     const n = Math.min(from.robots, to.robots);
     const ends = new Uint16Array(4 * n);
+    const longest = most / (this.#run?.gridStep ?? 1);
     for (let i = 0; i < n; ++i) {
-      ends[4 * i] = from.x[i]!;
-      ends[4 * i + 1] = from.y[i]!;
+      const near = Math.hypot(to.x[i]! - from.x[i]!, to.y[i]! - from.y[i]!) <= longest;
+      ends[4 * i] = near ? from.x[i]! : to.x[i]!;
+      ends[4 * i + 1] = near ? from.y[i]! : to.y[i]!;
       ends[4 * i + 2] = to.x[i]!;
       ends[4 * i + 3] = to.y[i]!;
     }
@@ -336,7 +339,7 @@ export class Renderer {
       this.#above.line(...arm, 1.5 * px, palette.accent);
       this.#above.convex(handle, palette.accent);
     }
-    this.#above.path(marks.trail, 2 * px, palette.accent);
+    for (const part of marks.trail) this.#above.path(part, 2 * px, palette.accent);
     if (!marks.selected) return;
     this.#above.path(circle(...marks.selected, radius + 4 * px, 48), 2.5 * px, palette.accent, true);
     if (marks.range <= 0) return;

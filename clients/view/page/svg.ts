@@ -121,7 +121,7 @@ export function svgOf(scene: Scene, camera: Camera, palette: Palette): string {
     else above.add(colour, `M${n(a[0])} ${n(a[1])}Q${n(bend[0])} ${n(bend[1])} ${n(b[0])} ${n(b[1])}`);
   }
   for (const rimOf of marks.ellipses) above.add(line(palette.tracked, 1.5), path(rimOf.map(at), true));
-  if (marks.trail.length > 1) above.add(line(palette.accent, 2), path(marks.trail.map(at), false));
+  for (const part of marks.trail.filter(({ length }) => length > 1)) above.add(line(palette.accent, 2), path(part.map(at), false));
   const words: string[] = [];
   const word = (text: string, [x, y]: Point, colour: Colour): void => {
     words.push(`<text x="${n(x)}" y="${n(y)}" ${fill(colour)}>${escaped(text)}</text>`);

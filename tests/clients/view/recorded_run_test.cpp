@@ -7,7 +7,9 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "clients/recorder/observables.hpp"
 #include "clients/view/flights.hpp"
@@ -145,7 +147,7 @@ TEST(RecordedRun, TellsOfRobotsAndTheirTrails) {
   EXPECT_EQ(robot["heardBy"][0]["robot"], 0);
   EXPECT_EQ(json::parse(run.robot(20))["type"], "notice");
   const json trail = json::parse(run.trail(3, 1000));
-  EXPECT_LE(trail["xy"].size(), 800u);
+  EXPECT_LE(trail["xy"].size(), 2 * kMostPoints + 2);
   EXPECT_GT(trail["xy"].size(), 200u);
   const Pose end = test::circling_pose(3, 20, 1000 * 0.032768);
   EXPECT_NEAR(trail["xy"][trail["xy"].size() - 2].get<double>(), end.x_mm, 1);
@@ -338,6 +340,48 @@ TEST(RecordedRun, TellsWhichMessagesFly) {
   const json bounded = json::parse(many.flights(-1, 1000));
   EXPECT_EQ(bounded["tick"].size(), kMostFlights);
   EXPECT_EQ(bounded["whole"], false);
+}
+
+TEST(RecordedRun, ShowsWhatWasSentWhereMuchIsReceived) {
+  Scratch scratch;
+  test::write_circling(scratch / "r.ktrec",
+                       {.robots = 6000, .states = 400, .every_s = 0.05, .flights = true, .inside = true});
+  RecordedRun run(scratch / "r.ktrec");
+  const json flights = json::parse(run.flights(-1, 400));
+  EXPECT_EQ(flights["tick"].size(), kMostFlights);
+  EXPECT_EQ(flights["whole"], false);
+  std::size_t sent = 0;
+  for (std::size_t i = 0; i < flights["tick"].size(); ++i) sent += flights["sender"][i] == flights["receiver"][i];
+  EXPECT_EQ(sent, kMostFlights / 2);
+}
+
+TEST(RecordedRun, ATrailIsCutWhereTheRobotWasPlacedElsewhere) {
+  Scratch scratch;
+  test::write_circling(scratch / "r.ktrec", {.robots = 20, .states = 120, .jumps = true});
+  RecordedRun run(scratch / "r.ktrec");
+  const auto cuts = [&run](std::uint32_t robot, std::int64_t tick) {
+    const json trail = json::parse(run.trail(robot, tick));
+    EXPECT_EQ(trail["whole"], true);
+    return std::count(trail["xy"].begin(), trail["xy"].end(), json(nullptr));
+  };
+  EXPECT_EQ(cuts(3, 100000), 0);
+  EXPECT_EQ(cuts(4, 100000), 2) << "x and y";
+  EXPECT_EQ(cuts(4, 500), 0) << "before it";
+}
+
+TEST(RecordedCurves, TwoViewersOfDifferentRobotsBothGetTheirCurves) {
+  Scratch scratch;
+  // So large that one answer does not suffice: 18 states of 2.6 MB each.
+  test::write_circling(scratch / "r.ktrec", {.robots = 100000, .states = 18});
+  RecordedRun run(scratch / "r.ktrec");
+  const std::uint32_t msd = number_of(run, "displacement");
+  std::map<std::uint32_t, int> answers;
+  for (std::set<std::uint32_t> waiting{1, 2, 3}; !waiting.empty();) {
+    for (const std::uint32_t robot : std::set(waiting)) {
+      ASSERT_LE(++answers[robot], 18) << "an answer reads a state at least";
+      if (json::parse(run.plot(msd, robot))["whole"].get<bool>()) waiting.erase(robot);
+    }
+  }
 }
 
 TEST(RecordedRun, MarksWhatWasPlacedElsewhere) {
