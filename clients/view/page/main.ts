@@ -12,7 +12,7 @@ import { Playback } from "./playback.ts";
 import { ellipsesOf, messageOf, showAlarms, showPackets } from "./outside.ts";
 import { Plots } from "./plots.ts";
 import { listenToPointer } from "./pointer.ts";
-import { kindsOf, lifeOf, LIFE_ABSENT, type Frame, type MarksText, type Message, type OutsideText, type RobotCounts, type Run, type Status, type TrailText, type WorkText } from "./protocol.ts";
+import { kindsOf, type Frame, type MarksText, type Message, type OutsideText, type RobotCounts, type Run, type Status, type TrailText, type WorkText } from "./protocol.ts";
 import { Renderer, type Marks } from "./renderer.ts";
 import { svgOf } from "./svg.ts";
 import { Theme } from "./theme.ts";
@@ -507,7 +507,6 @@ class Page {
     let nearest: number | undefined;
     let least = Math.max(this.#run.robotRadius, CLICK_REACH_PX / this.#camera.pxPerMm);
     for (let robot = 0; robot < frame.robots; ++robot) {
-      if (lifeOf(frame.state[robot]!) === LIFE_ABSENT) continue;
       const [a, b] = this.#placeOf(robot);
       const distance = Math.hypot(a - x, b - y);
       if (distance < least) [nearest, least] = [robot, distance];

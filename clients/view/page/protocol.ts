@@ -244,6 +244,7 @@ export const ledOf = (headingLed: number): [number, number, number] => [
 ];
 
 export const LIFE_RUNNING = 4;
+/** A tracked robot that is lost, has left, or has not come yet. Its place is the last known one. */
 export const LIFE_ABSENT = 13;
 export const LIFE_FLAT = 14;
 export const LIFE_FAILED = 15;
@@ -259,7 +260,7 @@ const LIFE_NAMES: Record<number, string> = {
   4: "running",
   5: "charging",
   6: "moving",
-  [LIFE_ABSENT]: "absent",
+  [LIFE_ABSENT]: "not there, last seen here",
   [LIFE_FLAT]: "battery flat",
   [LIFE_FAILED]: "failed",
 };

@@ -248,6 +248,19 @@ async function hybridRun() {
   } finally {
     player.kill("SIGTERM");
   }
+  // Without its tracker, every robot is lost: a dashed ring with a question mark at its last place.
+  const lost = async () => [...(await saved(page, "Save the picture as SVG")).toString().matchAll(/<text x="(-?[\d.]+)" y="(-?[\d.]+)"[^>]*>\?</g)];
+  await eventually("four question marks", async () => (await lost()).length === 4);
+  await eventually("its state", async () => (await text(page, "robot-facts")).includes("statenot there, last seen here"));
+  await page.keyboard.press("0");
+  const view = await page.locator("#picture").boundingBox();
+  const [lastX, lastY] = await onScreen(page, ...(await poseOfSelected(page)));
+  assert.ok((await lost()).some(([, x, y]) => Math.hypot(Number(x) + view.x - lastX, Number(y) - 4 + view.y - lastY) < 2), "robot 1 is marked where it was");
+  // A click selects it.
+  await page.keyboard.press("Escape");
+  await page.mouse.click(lastX, lastY);
+  await eventually("robot 1", async () => (await text(page, "robot-title")) === "Robot 1");
+  await picture(page, "lost");
   assert.deepEqual(page.faults, []);
   page.once("dialog", (dialog) => dialog.accept());
   await press(page, "Stop the run for good");
