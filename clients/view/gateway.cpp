@@ -309,6 +309,7 @@ class Gateway::Service {
       case Request::Kind::kProgram:
       case Request::Kind::kOutside:
       case Request::Kind::kFlights:
+      case Request::Kind::kFloors:
       case Request::Kind::kWork:
       case Request::Kind::kMarks: return viewer.ask(request);
       default: break;
@@ -388,23 +389,27 @@ class Gateway::Service {
   /// Turns requests into lines, until one has an answer. With answering_ held.
   void answer_in_line(Viewer& viewer) {
     if (viewer.at) {
-      if (const std::uint64_t version = answers_->floors_version(viewer.at->tick); version != viewer.floors_seen) {
-        viewer.floors_seen = version;
-        return viewer.tell(answers_->floors_at(viewer.at->tick));
-      }
+      if (std::string floors = new_floors(viewer, viewer.at->tick); !floors.empty()) viewer.tell(std::move(floors));
       return;  // the frame comes first
     }
     while (const std::optional<Request> request = viewer.next_question()) {
-      std::string line = answer_to(*request);
+      std::string line =
+          request->kind == Request::Kind::kFloors ? new_floors(viewer, request->tick) : answer_to(*request);
       if (!line.empty()) return viewer.tell(std::move(line));
     }
+  }
+
+  /// Empty where the viewer knows them. With answering_ held.
+  [[nodiscard]] std::string new_floors(Viewer& viewer, std::int64_t tick) {
+    const std::uint64_t version = answers_->floors_version(tick);
+    return std::exchange(viewer.floors_seen, version) == version ? std::string() : answers_->floors_at(tick);
   }
 
   /// With answering_ held.
   [[nodiscard]] std::string answer_to(const Request& request) {
     switch (request.kind) {
       case Request::Kind::kTrail: return answers_->trail(request.robot, request.tick);
-      case Request::Kind::kRobot: return answers_->robot(request.robot);
+      case Request::Kind::kRobot: return answers_->robot(request.robot, request.tick);
       case Request::Kind::kProgram: return answers_->program(request.robot, request.tick);
       case Request::Kind::kOutside: return answers_->outside(request.tick);
       case Request::Kind::kFlights: return answers_->flights(request.from, request.tick);

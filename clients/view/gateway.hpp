@@ -37,7 +37,7 @@ class Answers {
   [[nodiscard]] virtual std::string floors_at(std::int64_t tick) = 0;
   /// A text message, or empty: there is none.
   [[nodiscard]] virtual std::string trail(std::uint32_t robot, std::int64_t tick) = 0;
-  [[nodiscard]] virtual std::string robot(std::uint32_t robot) = 0;
+  [[nodiscard]] virtual std::string robot(std::uint32_t robot, std::int64_t tick) = 0;
   [[nodiscard]] virtual std::string plots() = 0;
   /// Of a robot, or of the swarm.
   [[nodiscard]] virtual std::string plot(std::uint32_t number, std::optional<std::uint32_t> robot) = 0;

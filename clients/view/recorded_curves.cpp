@@ -7,6 +7,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "clients/view/recently_used.hpp"
 #include "clients/view/run_text.hpp"
 #include "core/base/error.hpp"
 #include "core/base/ids.hpp"
@@ -67,17 +68,6 @@ int place_of(const proto::VariableRecord& record, std::uint32_t robot) {
   const auto found = std::lower_bound(record.robot().begin(), record.robot().end(), robot);
   if (found == record.robot().end() || *found != robot) return -1;
   return static_cast<int>(found - record.robot().begin());
-}
-
-/// The entry of a list for which `is` holds, moved to its front; a new one where there is none. The one at the end makes room.
-template <class Entry, class Is>
-Entry& recently_used(std::list<Entry>& list, std::size_t most, const Is& is, Entry fresh) {
-  if (const auto found = std::find_if(list.begin(), list.end(), is); found != list.end()) {
-    list.splice(list.begin(), list, found);
-    return list.front();
-  }
-  if (list.size() >= most) list.pop_back();
-  return list.emplace_front(std::move(fresh));
 }
 
 }  // namespace

@@ -21,7 +21,9 @@ import { showWork } from "./work.ts";
 const PANEL_EVERY_MS = 200;
 /** How often the selected robot's variables and log are asked for while time passes. */
 const PROGRAM_EVERY_MS = 400;
+const COUNTS_EVERY_MS = 400;
 const OUTSIDE_EVERY_MS = 250;
+const FLOORS_EVERY_MS = 500;
 const WORK_EVERY_MS = 1000;
 /** Marks are asked for again while not all have come, and while the recording grows. */
 const MARKS_EVERY_MS = 1000;
@@ -66,6 +68,8 @@ class Page {
   #selected: number | undefined;
   #trail: Point[][] = []; // of the selected robot, in parts
   #program: { tick: number; askedAt: number } | undefined; // what was asked for last
+  #countsAsked: { tick: number; at: number } | undefined;
+  #floorsAsked = -Infinity;
   #outside: OutsideText | undefined;
   #ellipses: [number, number][][] = [];
   #outsideAsked: { tick: number; at: number } | undefined;
@@ -126,7 +130,7 @@ class Page {
     showConnection("lost");
     this.#playback.lost();
     this.#plots.lost();
-    this.#program = this.#outsideAsked = undefined;
+    this.#program = this.#outsideAsked = this.#countsAsked = undefined;
     this.#flights.forget();
     this.#mover.refused();
   }
@@ -167,6 +171,7 @@ class Page {
           showMarks(this.#timeMarks, this.#run, (tick) => this.#seek(tick));
         }
         this.#marksDue = true;
+        this.#countsAsked = undefined;
         return;
       case "floors": return this.#renderer.setFloors(message.floors);
       case "trail":
@@ -217,7 +222,7 @@ class Page {
     element("speed").parentElement!.hidden = this.#playback.live;
     element("back").hidden = this.#playback.live;
     this.#picture.setAttribute("aria-label", `The arena of ${run.name} from above, ${run.robots} robots`);
-    if (this.#selected !== undefined) this.#connection.send({ do: "robot", robot: this.#selected });
+    this.#countsAsked = undefined;
     this.#buttons();
   }
 
@@ -298,7 +303,8 @@ class Page {
     this.counters.flights += flying;
     this.counters.handOvers = this.#handOvers.count;
     this.counters.held = this.#mover.held ? `${this.#mover.held.movable ? "object" : "robot"} ${this.#mover.held.body}${this.#mover.waiting ? " waits" : ""}` : "";
-    return { selected, trail, range, ellipses: this.#ellipses, flights, flashes, held: this.#mover.lines() };
+    const heard = this.#flights.shown && this.#counts?.robot === this.#selected ? (this.#counts?.lately ?? []).map(place) : [];
+    return { selected, trail, range, heard, ellipses: this.#ellipses, flights, flashes, held: this.#mover.lines() };
   }
 
   /** Where a robot is drawn, mm. */
@@ -374,6 +380,21 @@ class Page {
     this.#connection.send({ do: "program", robot, tick });
   }
 
+  #askCounts(robot: number, tick: number, now: number): void {
+    const last = this.#countsAsked;
+    const settled = last?.tick === tick && this.#counts?.tick === tick && this.#counts.whole;
+    if (last && (settled || now - last.at < COUNTS_EVERY_MS)) return;
+    this.#countsAsked = { tick, at: now };
+    this.#connection.send({ do: "robot", robot, tick });
+  }
+
+  /** Floors of recordings come with their states. */
+  #askFloors(tick: number, now: number): void {
+    if (!this.#playback.live || now - this.#floorsAsked < FLOORS_EVERY_MS) return;
+    this.#floorsAsked = now;
+    this.#connection.send({ do: "floors", tick });
+  }
+
   #askOutside(tick: number, now: number): void {
     const last = this.#outsideAsked;
     if (last && (last.tick === tick || now - last.at < OUTSIDE_EVERY_MS)) return;
@@ -414,9 +435,11 @@ class Page {
     if (this.#selected !== undefined) {
       showRobot(run, frame, this.#selected, this.#counts);
       this.#askProgram(this.#selected, Math.floor(time), now);
+      this.#askCounts(this.#selected, Math.floor(time), now);
       if (!this.#playback.live && this.#trailTick !== Math.floor(time)) this.#askTrail();
     }
     this.#askOutside(Math.floor(time), now);
+    this.#askFloors(Math.floor(time), now);
     this.#askWork(now);
     this.#askMarks(now);
     this.#plots.update(now, time * run.tickSeconds);
@@ -487,7 +510,7 @@ class Page {
     this.#selected = robot;
     this.#trail = [];
     this.#mayTrail = 0;
-    this.#program = undefined;
+    this.#program = this.#countsAsked = this.#counts = undefined;
     this.#stale = true;
     this.#plots.select(robot);
     showProgram(undefined);
@@ -495,7 +518,6 @@ class Page {
       element("robot").hidden = true;
       return;
     }
-    this.#connection.send({ do: "robot", robot });
     if (!this.#playback.live) this.#askTrail();
     if (this.#run && this.#playback.current) showRobot(this.#run, this.#playback.current, robot, this.#counts);
   }

@@ -76,9 +76,25 @@ export interface Floor {
 export interface RobotCounts {
   type: "robot";
   robot: number;
-  radio?: { attempted: number; sent: number; received: number; collided: number; backedOff: number };
+  tick: number;
+  /** false: not all was read; more, if it is asked for again. */
+  whole: boolean;
+  /** Of recorded events up to the tick; absent: they are not recorded. Counted from the tick `since`, if it is there. */
+  sent?: number;
+  received?: number;
   heard?: { robot: number; count: number }[];
-  heardBy?: { robot: number; count: number }[];
+  since?: number;
+  /** Robots that it has heard within the last seconds. */
+  lately?: number[];
+  /** Of the whole run. */
+  run?: {
+    sent?: number;
+    received?: number;
+    collided?: number;
+    backedOff?: number;
+    heard?: { robot: number; count: number }[];
+    heardBy?: { robot: number; count: number }[];
+  };
 }
 
 /** What can be plotted over time, of the swarm and of single robots. */

@@ -11,6 +11,7 @@ const LEAST_RADIUS_PX = 1.7;
 /** Vertices of a message: the strip along its arc. */
 const FLIGHT_VERTICES = 34;
 const GHOST_ALPHA = 30;
+const HEARD_ALPHA = 110;
 
 /** Colours of a theme, 0 to 255. */
 export interface Palette {
@@ -37,6 +38,8 @@ export interface Marks {
   /** Where the selected robot was; parts, because it may have been placed elsewhere in between. */
   trail: Point[][];
   range: number;
+  /** Robots that the selected one has heard lately. */
+  heard: Point[];
   /** Where tracked robots are with a probability of 95 %: rims. */
   ellipses: Point[][];
   /** Messages: FLOATS of flights.ts each. */
@@ -339,6 +342,8 @@ export class Renderer {
       this.#above.line(...arm, 1.5 * px, palette.accent);
       this.#above.convex(handle, palette.accent);
     }
+    const faint: Colour = [palette.message[0], palette.message[1], palette.message[2], HEARD_ALPHA];
+    if (marks.selected) for (const from of marks.heard) this.#above.line(from, marks.selected, 1.5 * px, faint);
     for (const part of marks.trail) this.#above.path(part, 2 * px, palette.accent);
     if (!marks.selected) return;
     this.#above.path(circle(...marks.selected, radius + 4 * px, 48), 2.5 * px, palette.accent, true);

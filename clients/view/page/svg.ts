@@ -128,6 +128,7 @@ export function svgOf(scene: Scene, camera: Camera, palette: Palette): string {
     if (fromX === toX && fromY === toY) above.add(colour, disc(a, r * (1.15 + 1.2 * age)));
     else above.add(colour, `M${n(a[0])} ${n(a[1])}Q${n(bend[0])} ${n(bend[1])} ${n(b[0])} ${n(b[1])}`);
   }
+  if (marks.selected) for (const from of marks.heard) above.add(`${line(palette.message, 1.5)} stroke-opacity="0.4"`, path([at(from), at(marks.selected)], false));
   for (const rimOf of marks.ellipses) above.add(line(palette.tracked, 1.5), path(rimOf.map(at), true));
   for (const part of marks.trail.filter(({ length }) => length > 1)) above.add(line(palette.accent, 2), path(part.map(at), false));
   for (const spot of run.circles) word(spot.name, at([spot.x, spot.y + spot.radius]), palette.ink);

@@ -128,7 +128,7 @@ TEST_F(GatewayTest, AnswersWithTheStateAtATick) {
   const auto frame = viewer.await("frame");
   ASSERT_TRUE(frame);
   EXPECT_EQ(frame->payload, run_->frame_at(100, 5));
-  viewer.send_text(R"({"do":"robot","robot":1})");
+  viewer.send_text(R"({"do":"robot","robot":1,"tick":100})");
   EXPECT_TRUE(viewer.await("robot"));
   viewer.send_text(R"({"do":"trail","robot":1,"tick":100})");
   EXPECT_TRUE(viewer.await("trail"));
@@ -294,7 +294,7 @@ TEST_F(GatewayTest, WhoAsksExpensiveQuestionsWaitsForTheOthers) {
   const int before = slow.plots_answered;
   for (int i = 0; i < kRounds; ++i) {
     if (i % 4 == 3) ask_much();
-    viewer.send_text(R"({"do":"robot","robot":1})");
+    viewer.send_text(R"({"do":"robot","robot":1,"tick":100})");
     ASSERT_TRUE(viewer.await("robot"));
   }
   EXPECT_LE(slow.plots_answered - before, 3 * kRounds) << "not one of each greedy viewer per answer";
@@ -312,7 +312,7 @@ TEST_F(GatewayTest, AViewerThatDoesNotReadItsAnswersHoldsUpNobody) {
     stalled.send_text(R"({"do":"flights","from":-1,"tick":100000})");
     stalled.send_text(R"({"do":"trail","robot":1,"tick":100000})");
     if (i % 100 == 99) {
-      viewer.send_text(R"({"do":"robot","robot":1})");
+      viewer.send_text(R"({"do":"robot","robot":1,"tick":100})");
       ASSERT_TRUE(viewer.await("robot")) << i;
     }
   }

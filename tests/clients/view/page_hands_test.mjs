@@ -78,6 +78,8 @@ async function movesAndHandOvers() {
   assert.match(await text(page, "federates"), /physics 0,0computes \d+, exchanges \d+, waits \d+ %/);
   await eventually("nobody holds up a run at its pace", async () => (await text(page, "work-verdict")).startsWith("Nobody holds up"));
   await select(page, 7);
+  await eventually("its messages", async () => /messages sent[1-9]\d*…?received[1-9]\d*…?heard most\d+ \(/.test(await text(page, "robot-facts")));
+  await eventually("lines from robots that it heard", async () => (await saved(page, "Save the picture as SVG")).toString().includes('stroke-opacity="0.4"'));
   await picture(page, "messages");
 
   // A viewer without the token moves nothing.

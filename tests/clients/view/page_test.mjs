@@ -51,7 +51,13 @@ async function recordedRun() {
     await eventually(`robot ${robot}`, async () => (await text(page, "robot-title")) === `Robot ${robot}`);
   };
   await click(700);
-  await eventually("its counters", async () => (await text(page, "robot-facts")).includes("messages sent703"));
+  // Counts up to now where events are recorded, else of the whole run. A line leads from the robot that it has heard.
+  const statesSoFar = Math.floor((at + 0.001) / 0.5);
+  await eventually("its counters", async () => (await text(page, "robot-facts")).includes(`messages sent, whole run703received${statesSoFar}heard most701 (${statesSoFar})`));
+  const heard = /stroke-opacity="0.4" d="M(-?[\d.]+) (-?[\d.]+)L(-?[\d.]+) (-?[\d.]+)"/.exec((await saved(page, "Save the picture as SVG")).toString());
+  const [heardX, heardY] = await onScreen(page, ...circling(701, at));
+  const arena = await page.locator("#picture").boundingBox();
+  assert.ok(Math.hypot(Number(heard[1]) + arena.x - heardX, Number(heard[2]) + arena.y - heardY) < 1);
   await picture(page, "recorded");
 
   // Messages fly between robots of the recording, a bounded number in a picture; the button hides them.

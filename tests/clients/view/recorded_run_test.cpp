@@ -139,13 +139,13 @@ TEST(RecordedRun, TellsOfRobotsAndTheirTrails) {
   Scratch scratch;
   test::write_circling(scratch / "r.ktrec", {.robots = 20, .states = 2000, .every_s = 0.1});
   RecordedRun run(scratch / "r.ktrec");
-  const json robot = json::parse(run.robot(1));
-  EXPECT_EQ(robot["radio"]["attempted"], 6);
+  const json robot = json::parse(run.robot(1, 1000))["run"];
+  EXPECT_EQ(robot["attempted"], 6);
   EXPECT_EQ(robot["heard"][0]["robot"], 0);
   EXPECT_EQ(robot["heard"][0]["count"], 9);
   EXPECT_EQ(robot["heard"].size(), 2u);
   EXPECT_EQ(robot["heardBy"][0]["robot"], 0);
-  EXPECT_EQ(json::parse(run.robot(20))["type"], "notice");
+  EXPECT_EQ(json::parse(run.robot(20, 0))["type"], "notice");
   const json trail = json::parse(run.trail(3, 1000));
   EXPECT_LE(trail["xy"].size(), 2 * kMostPoints + 2);
   EXPECT_GT(trail["xy"].size(), 200u);
@@ -353,6 +353,28 @@ TEST(RecordedRun, ShowsWhatWasSentWhereMuchIsReceived) {
   std::size_t sent = 0;
   for (std::size_t i = 0; i < flights["tick"].size(); ++i) sent += flights["sender"][i] == flights["receiver"][i];
   EXPECT_EQ(sent, kMostFlights / 2);
+}
+
+TEST(RecordedRun, CountsMessagesUpToTheTick) {
+  Scratch scratch;
+  test::write_circling(scratch / "r.ktrec", {.robots = 40, .states = 60, .flights = true, .inside = true});
+  RecordedRun run(scratch / "r.ktrec");
+  // Before each state but the first, robot 10 receives a message of robot 11, and robot 11 sends at each state.
+  const recorder::RecordingSchedule schedule(TickLength{262144}, 0.5);
+  for (const int number : {0, 1, 30, 59, 12}) {
+    const std::int64_t tick = schedule.tick(number).count();
+    const json receiver = json::parse(run.robot(10, tick)), sender = json::parse(run.robot(11, tick));
+    EXPECT_EQ(receiver["whole"], true);
+    EXPECT_EQ(receiver["received"], number);
+    EXPECT_EQ(receiver["sent"], 0);
+    EXPECT_EQ(receiver["heard"].empty(), number == 0);
+    EXPECT_EQ(receiver["lately"], number == 0 ? json::array() : json{11});
+    EXPECT_EQ(sender["sent"], number + 1);
+    EXPECT_EQ(sender["received"], 0);
+    if (number > 0) {
+      EXPECT_EQ(receiver["heard"][0]["count"], number);
+    }
+  }
 }
 
 TEST(RecordedRun, ATrailIsCutWhereTheRobotWasPlacedElsewhere) {
