@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
 
+#include "clients/view/robot_messages.hpp"
 #include "idl/recording.pb.h"
 
 namespace kilotwin::view {
@@ -54,6 +57,31 @@ std::string LiveFlights::text(std::int64_t from, std::int64_t until) const {
     wanted.push_back(*flight);
   }
   return flights_text({from, until, static_cast<double>(until_), whole}, wanted);
+}
+
+std::set<std::uint32_t> LiveFlights::heard_lately(std::uint32_t robot, double ticks) const {
+  std::set<std::uint32_t> heard;
+  for (const Flight& flight : flights_)
+    if (flight.receiver == robot && flight.sender != robot && flight.tick > static_cast<double>(until_) - ticks)
+      heard.insert(flight.sender);
+  return heard;
+}
+
+std::string LiveFlights::robot_text(std::uint32_t robot, std::int64_t tick, double lately_ticks) const {
+  std::uint64_t sent = 0, received = 0;
+  std::map<std::uint32_t, std::uint32_t> heard;
+  for (const Flight& flight : flights_) {
+    if (flight.sender == robot && flight.receiver == robot) ++sent;
+    if (flight.receiver != robot || flight.sender == robot) continue;
+    ++received;
+    ++heard[flight.sender];
+  }
+  nlohmann::json text{{"type", "robot"}, {"robot", robot},       {"tick", tick},
+                      {"sent", sent},    {"received", received}, {"heard", partners(heard)}};
+  text["lately"] = heard_lately(robot, lately_ticks);
+  text["whole"] = true;
+  text["since"] = flights_.empty() ? until_ : static_cast<std::int64_t>(flights_.front().tick);
+  return text.dump();
 }
 
 }  // namespace kilotwin::view

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -41,6 +42,10 @@ class LiveFlights {
   /// Takes a message Observations of idl/recording.proto, which may be empty: what the radio saw up to tick `until`.
   void take(const void* observations, std::size_t octets, std::int64_t until, const TickLength& length);
   [[nodiscard]] std::string text(std::int64_t from, std::int64_t until) const;
+  /// A message of type "robot", of the newest kMostKept messages of the swarm. `lately_ticks`: as for heard_lately().
+  [[nodiscard]] std::string robot_text(std::uint32_t robot, std::int64_t tick, double lately_ticks) const;
+  /// Robots that a robot has heard within the last ticks.
+  [[nodiscard]] std::set<std::uint32_t> heard_lately(std::uint32_t robot, double ticks) const;
   void clear() { *this = {}; }
 
  private:

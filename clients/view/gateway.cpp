@@ -11,6 +11,7 @@
 #include <mutex>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "clients/http/loopback_server.hpp"
 #include "clients/view/run_text.hpp"
@@ -54,11 +55,15 @@ struct Newest {
 };
 
 struct Viewer {
+  explicit Viewer(lws* at_connection) : connection(at_connection) {}
+  lws* const connection;
+  double served_s = 0;  // the time of its answers, from the place in the queue where it began to wait
   bool may_steer = false, wants_frame = false;
   std::uint64_t run_seen = 0, status_seen = 0, frame_seen = 0, floors_seen = 0;
   std::optional<Request> at;
   std::deque<Request> questions;  // at most kMostQuestions
   std::deque<std::string> lines;
+  Message answered_frame;  // nullptr: none
   std::string incoming;
   double allowance = kMostRequestsPerSecond;  // requests that it may send now
   Clock::time_point counted = Clock::now();
@@ -84,6 +89,7 @@ struct Viewer {
     questions.pop_front();
     return question;
   }
+  [[nodiscard]] bool waits() const { return at || !questions.empty(); }
   void tell(std::string line) {
     if (lines.size() < kMostWaitingLines) lines.push_back(std::move(line));
   }
@@ -131,6 +137,7 @@ class Gateway::Service {
     {
       const std::scoped_lock lock(answering_, mutex_);
       answers_ = &answers;
+      has_answers_ = true;
       run_.set(std::move(run_text));
       status_.message.reset();
       frame_.message.reset();
@@ -244,7 +251,8 @@ class Gateway::Service {
         ++service.refused_;
         return -1;
       case LWS_CALLBACK_ESTABLISHED:
-        session->viewer = new Viewer;
+        session->viewer = new Viewer(connection);
+        service.all_.push_back(session->viewer);
         ++service.viewers_;
         lws_callback_on_writable(connection);
         return 0;
@@ -252,10 +260,12 @@ class Gateway::Service {
         return service.receive(connection, *session->viewer, {static_cast<char*>(in), length});
       case LWS_CALLBACK_SERVER_WRITEABLE: return service.send_next(connection, *session->viewer);
       case LWS_CALLBACK_EVENT_WAIT_CANCELLED:
+        service.answer_one();
         lws_callback_on_writable_all_protocol(lws_get_context(connection), lws_get_protocol(connection));
         return 0;
       case LWS_CALLBACK_CLOSED:
         if (session != nullptr && session->viewer != nullptr) {
+          std::erase(service.all_, session->viewer);
           delete std::exchange(session->viewer, nullptr);
           --service.viewers_;
         }
@@ -283,6 +293,8 @@ class Gateway::Service {
   }
 
   void take(Viewer& viewer, const Request& request) {
+    // Who comes again after a while has saved up nothing.
+    if (!viewer.waits()) viewer.served_s = std::max(viewer.served_s, serving_s_);
     switch (request.kind) {
       case Request::Kind::kHello:
         viewer.may_steer = equal_tokens(request.token, token_);
@@ -297,6 +309,7 @@ class Gateway::Service {
       case Request::Kind::kProgram:
       case Request::Kind::kOutside:
       case Request::Kind::kFlights:
+      case Request::Kind::kFloors:
       case Request::Kind::kWork:
       case Request::Kind::kMarks: return viewer.ask(request);
       default: break;
@@ -305,7 +318,7 @@ class Gateway::Service {
       return viewer.tell(notice_text("Steering needs the whole address that `kilotwin view` has printed."));
     const std::lock_guard lock(answering_);
     const std::string refusal = answers_ == nullptr ? "There is no run yet." : answers_->steer(request);
-    if (!refusal.empty()) viewer.tell(notice_text(refusal));
+    if (!refusal.empty()) viewer.tell(refusal_text(refusal, request.kind == Request::Kind::kPlace));
   }
 
   /// Sends one message, the most urgent one.
@@ -331,6 +344,7 @@ class Gateway::Service {
         viewer.run_seen = run_.number;
         viewer.floors_seen = 0;
         viewer.at.reset();
+        viewer.answered_frame.reset();
         return {run_.message};
       }
       if (status_.message && viewer.status_seen != status_.number) {
@@ -343,37 +357,59 @@ class Gateway::Service {
         return {frame_.message, true};
       }
     }
-    if (viewer.lines.empty()) answer(viewer);
     if (!viewer.lines.empty()) {
       Outgoing line{std::make_shared<const std::string>(std::move(viewer.lines.front()))};
       viewer.lines.pop_front();
       return line;
     }
-    return answered_frame(viewer);
+    if (viewer.answered_frame) return {std::exchange(viewer.answered_frame, nullptr), true};
+    if (viewer.waits() && has_answers_) server_.wake();
+    return {};
   }
 
-  /// Turns requests into lines, until one has an answer.
-  void answer(Viewer& viewer) {
+  /// Answers one request. Between two answers, the server reads what viewers have sent and writes to those that read. Fair queueing:
+  /// of those who wait and read, the viewer whose answers have taken least time is next.
+  void answer_one() {
+    Viewer* next = nullptr;
+    for (Viewer* const viewer : all_) {
+      if (!viewer->waits() || !viewer->lines.empty() || viewer->answered_frame) continue;
+      if (next != nullptr && next->served_s <= viewer->served_s) continue;
+      if (lws_send_pipe_choked(viewer->connection) == 0) next = viewer;
+    }
+    if (next == nullptr) return;
     const std::lock_guard lock(answering_);
     if (answers_ == nullptr) return;
+    serving_s_ = next->served_s;
+    const auto began = Clock::now();
+    answer_in_line(*next);
+    if (next->lines.empty()) answer_with_frame(*next);
+    next->served_s += std::chrono::duration<double>(Clock::now() - began).count();
+  }
+
+  /// Turns requests into lines, until one has an answer. With answering_ held.
+  void answer_in_line(Viewer& viewer) {
     if (viewer.at) {
-      if (const std::uint64_t version = answers_->floors_version(viewer.at->tick); version != viewer.floors_seen) {
-        viewer.floors_seen = version;
-        return viewer.tell(answers_->floors_at(viewer.at->tick));
-      }
+      if (std::string floors = new_floors(viewer, viewer.at->tick); !floors.empty()) viewer.tell(std::move(floors));
       return;  // the frame comes first
     }
     while (const std::optional<Request> request = viewer.next_question()) {
-      std::string line = answer_to(*request);
+      std::string line =
+          request->kind == Request::Kind::kFloors ? new_floors(viewer, request->tick) : answer_to(*request);
       if (!line.empty()) return viewer.tell(std::move(line));
     }
+  }
+
+  /// Empty where the viewer knows them. With answering_ held.
+  [[nodiscard]] std::string new_floors(Viewer& viewer, std::int64_t tick) {
+    const std::uint64_t version = answers_->floors_version(tick);
+    return std::exchange(viewer.floors_seen, version) == version ? std::string() : answers_->floors_at(tick);
   }
 
   /// With answering_ held.
   [[nodiscard]] std::string answer_to(const Request& request) {
     switch (request.kind) {
       case Request::Kind::kTrail: return answers_->trail(request.robot, request.tick);
-      case Request::Kind::kRobot: return answers_->robot(request.robot);
+      case Request::Kind::kRobot: return answers_->robot(request.robot, request.tick);
       case Request::Kind::kProgram: return answers_->program(request.robot, request.tick);
       case Request::Kind::kOutside: return answers_->outside(request.tick);
       case Request::Kind::kFlights: return answers_->flights(request.from, request.tick);
@@ -386,23 +422,24 @@ class Gateway::Service {
     }
   }
 
-  [[nodiscard]] Outgoing answered_frame(Viewer& viewer) {
-    if (!viewer.at) return {};
-    const std::lock_guard lock(answering_);
-    std::string frame =
-        answers_ == nullptr ? std::string() : answers_->frame_at(viewer.at->tick, viewer.at->number);
+  /// With answering_ held.
+  void answer_with_frame(Viewer& viewer) {
+    if (!viewer.at) return;
+    std::string frame = answers_->frame_at(viewer.at->tick, viewer.at->number);
     viewer.at.reset();
-    if (frame.empty()) return {};
-    return {std::make_shared<const std::string>(std::move(frame)), true};
+    if (!frame.empty()) viewer.answered_frame = std::make_shared<const std::string>(std::move(frame));
   }
 
   const std::string token_;
   const PageFiles page_;
   std::atomic<std::uint32_t> viewers_{0};
   std::atomic<std::uint64_t> frames_{0}, bytes_{0}, refused_{0};
+  std::vector<Viewer*> all_;  // of the server's thread, like what follows
+  double serving_s_ = 0;      // `served_s` of the viewer that was answered last, before that
   mutable std::mutex mutex_;
   std::mutex answering_;        // held during calls of answers_
   Answers* answers_ = nullptr;  // guarded by answering_
+  std::atomic<bool> has_answers_{false};
   http::LoopbackServer server_;
 };
 

@@ -3,7 +3,10 @@
 /// A viewer gets text messages, JSON objects with a `type`, and binary frames (frame_code.hpp); it sends requests (request.hpp).
 /// A viewer gets one frame per request, so a slow one gets fewer frames, and one that stalls gets none. Requests that it has not
 /// been answered replace each other. A viewer that breaks the rules is disconnected: a message that is too long or no request,
-/// or more than kMostRequestsPerSecond. No viewer delays post_frame() or another viewer.
+/// or more than kMostRequestsPerSecond. No viewer delays post_frame().
+///
+/// One thread answers. Next is the viewer whose answers have taken least time, so one that asks expensive questions waits for the
+/// others, and they wait for one of its answers at most.
 ///
 /// Browsers let pages of any origin open a WebSocket. The gateway therefore serves only requests whose `Host` is this machine
 /// and whose `Origin` is the page's own. To steer a run, a viewer shows the token that its address carries.
@@ -34,7 +37,7 @@ class Answers {
   [[nodiscard]] virtual std::string floors_at(std::int64_t tick) = 0;
   /// A text message, or empty: there is none.
   [[nodiscard]] virtual std::string trail(std::uint32_t robot, std::int64_t tick) = 0;
-  [[nodiscard]] virtual std::string robot(std::uint32_t robot) = 0;
+  [[nodiscard]] virtual std::string robot(std::uint32_t robot, std::int64_t tick) = 0;
   [[nodiscard]] virtual std::string plots() = 0;
   /// Of a robot, or of the swarm.
   [[nodiscard]] virtual std::string plot(std::uint32_t number, std::optional<std::uint32_t> robot) = 0;

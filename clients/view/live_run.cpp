@@ -25,6 +25,11 @@ constexpr auto kLookAtRecording = 250ms;
 /// A place that a tracker stated is shown for so long.
 constexpr auto kPlaceHolds = 1s;
 constexpr std::size_t kMostTrackers = 16;
+/// A run that is so many times faster than real time shows fewer states.
+constexpr double kFast = 8;
+constexpr auto kBetweenStatesOfAFastRun = 50ms;
+/// Robots that were heard within this time count as heard lately.
+constexpr double kLately_s = 3;
 /// Messages are read for so long after a viewer has asked for them.
 constexpr auto kFlightsWanted = 2s;
 
@@ -116,8 +121,9 @@ LiveRun::~LiveRun() = default;
 void LiveRun::serve(Gateway& gateway) {
   switch (observer_.wait(50ms)) {
     case observe::News::kRunBegan: begin(gateway); break;
-    case observe::News::kState: post_state(gateway); break;
+    case observe::News::kState: unposted_ = true; break;
     case observe::News::kRunEnded:
+      if (unposted_ && observer_.state() != nullptr) post_state(gateway);
       post_status(gateway, true);
       ended_run_ = run_.exchange(0);
       if (tells_) say("kilotwin: the run has ended");
@@ -125,6 +131,8 @@ void LiveRun::serve(Gateway& gateway) {
     case observe::News::kNothing: break;
   }
   if (observer_.run() == nullptr) return;
+  if (unposted_ && observer_.state() != nullptr && (Clock::now() >= next_post_ || !runs_fast()))
+    post_state(gateway);
   post_status(gateway, false);
   follow_recording();
 }
@@ -188,9 +196,18 @@ void LiveRun::begin(Gateway& gateway) {
   }
 }
 
+/// Faster than people look at runs: a run without a pace takes what the machine has, and viewers shall leave it that.
+bool LiveRun::runs_fast() const {
+  const observe::SwarmAt *const at = observer_.state(), *const before = observer_.earlier_state();
+  if (at == nullptr || before == nullptr) return false;
+  return at->time_s - before->time_s > kFast * 1e-9 * static_cast<double>(at->wall_ns - before->wall_ns);
+}
+
 void LiveRun::post_state(Gateway& gateway) {
   const SwarmView& swarm = observer_.state()->swarm;
+  unposted_ = false;
   if (run_ == 0) return;
+  next_post_ = Clock::now() + kBetweenStatesOfAFastRun;
   FrameColumns columns;
   columns.x_mm = swarm.x_mm;
   columns.y_mm = swarm.y_mm;
@@ -214,6 +231,30 @@ void LiveRun::post_status(Gateway& gateway, bool ended) {
     status = status_;
   }
   gateway.post_status(status_text(status, ended));
+}
+
+std::uint64_t LiveRun::floors_version(std::int64_t tick) {
+  const std::shared_ptr<RecordedRun> recorded = recording();
+  return recorded ? recorded->floors_version(tick) : 0;
+}
+
+std::string LiveRun::floors_at(std::int64_t tick) {
+  const std::shared_ptr<RecordedRun> recorded = recording();
+  return recorded ? recorded->floors_at(tick) : std::string();
+}
+
+std::string LiveRun::robot(std::uint32_t robot, std::int64_t tick) {
+  const std::shared_ptr<RecordedRun> recorded = recording();
+  std::set<std::uint32_t> heard;
+  {
+    const std::lock_guard lock(mutex_);
+    flights_until_ = Clock::now() + kFlightsWanted;
+    const double lately_ticks = plan_ ? kLately_s / plan_->tick_length.seconds() : 0;
+    if (!recorded || !recorded->counts_messages()) return live_flights_.robot_text(robot, tick, lately_ticks);
+    // The recording is up to a second late; who was heard lately is known sooner.
+    heard = live_flights_.heard_lately(robot, lately_ticks);
+  }
+  return recorded->robot(robot, tick, heard);
 }
 
 std::string LiveRun::plots() {

@@ -1,6 +1,6 @@
 /// LiveRun: runs on a domain as they happen. States come from an observer, which can never slow a run; requests go out as
-/// RunControl, as any other program's would. Curves, variables and logs come from the run's recording while it grows, where
-/// its directory is given.
+/// RunControl, as any other program's would. Curves, variables, logs, floors and counts of messages come from the run's recording
+/// while it grows, where its directory is given.
 #pragma once
 
 #include <atomic>
@@ -38,10 +38,10 @@ class LiveRun : public Answers {
 
   // Answers.
   [[nodiscard]] std::string frame_at(std::int64_t, std::uint32_t) override { return {}; }
-  [[nodiscard]] std::uint64_t floors_version(std::int64_t) override { return 0; }
-  [[nodiscard]] std::string floors_at(std::int64_t) override { return {}; }
+  [[nodiscard]] std::uint64_t floors_version(std::int64_t tick) override;
+  [[nodiscard]] std::string floors_at(std::int64_t tick) override;
   [[nodiscard]] std::string trail(std::uint32_t, std::int64_t) override { return {}; }
-  [[nodiscard]] std::string robot(std::uint32_t) override { return {}; }
+  [[nodiscard]] std::string robot(std::uint32_t robot, std::int64_t tick) override;
   [[nodiscard]] std::string plots() override;
   [[nodiscard]] std::string plot(std::uint32_t number, std::optional<std::uint32_t> robot) override;
   [[nodiscard]] std::string program(std::uint32_t robot, std::int64_t tick) override;
@@ -58,6 +58,7 @@ class LiveRun : public Answers {
   };
   void begin(Gateway& gateway);
   void post_state(Gateway& gateway);
+  [[nodiscard]] bool runs_fast() const;
   void follow_recording();
   void on_tracker_frame(const PublicTrackerFrame& frame);
   void on_packet(const PublicStationPacket& packet);
@@ -94,6 +95,8 @@ class LiveRun : public Answers {
   dds::Reader<WireMetrics> metrics_;
 
   std::uint64_t posted_status_ = 0, ended_run_ = 0;
+  Clock::time_point next_post_{};  // of a state
+  bool unposted_ = false;          // the newest state
   PositionGrid grid_;
   const std::string client_;   // how requests are signed
   std::uint32_t request_ = 0;  // of the gateway's thread

@@ -7,6 +7,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "clients/view/recently_used.hpp"
+#include "clients/view/run_text.hpp"
 #include "core/base/error.hpp"
 #include "core/base/ids.hpp"
 
@@ -24,7 +26,9 @@ constexpr auto kReadFor = 40ms;
 constexpr auto kAnswerHolds = 1s;
 constexpr std::size_t kMostAnswers = 64;
 /// Records of events that one answer reads at most.
-constexpr std::size_t kMostRecordsPerAnswer = 4000, kMostEventCounts = 8;
+constexpr std::size_t kMostRecordsPerAnswer = 4000;
+/// Curves of which it is remembered what was read. More than viewers that look at different robots at once, as a rule.
+constexpr std::size_t kMostEventCounts = 32, kMostKnownPoints = 64;
 /// Records of one variable that are taken between two states at most, the newest ones.
 constexpr std::size_t kMostValueRecords = 256;
 /// Variables and events reach the recording at most so many ticks after the newest one, and some more.
@@ -55,6 +59,9 @@ double number_in(const proto::VariableRecord& record, int i) {
   if (i < record.integer_size()) return static_cast<double>(record.integer(i));
   return i < record.number_size() ? record.number(i) : kNothing;
 }
+
+/// Further than this a robot does not drive in so many seconds: it was placed elsewhere. The page knows the same bound.
+double furthest_mm(double seconds) { return 20 + 60 * seconds; }
 
 /// Where a robot stands in a record, whose robots ascend; -1: nowhere.
 int place_of(const proto::VariableRecord& record, std::uint32_t robot) {
@@ -141,7 +148,9 @@ std::string RecordedCurves::plot(std::uint32_t number, std::optional<std::uint32
       robot ? std::to_string(*robot) : "null", curves.whole, json(curves.names).dump(), numbers(curves.time_s));
   for (std::size_t i = 0; i < curves.values.size(); ++i) text += (i > 0 ? "," : "") + numbers(curves.values[i]);
   text += "]}";
-  if (answers_.size() >= kMostAnswers) answers_.clear();
+  if (answers_.size() >= kMostAnswers)
+    answers_.erase(std::min_element(answers_.begin(), answers_.end(),
+                                    [](const auto& a, const auto& b) { return a.second.made < b.second.made; }));
   if (curves.whole) answers_[key] = {text, index_.states().size(), index_.ended(), now};
   return text;
 }
@@ -163,38 +172,59 @@ std::size_t RecordedCurves::stride(std::size_t entries, std::size_t entry_bytes)
 }
 
 template <class Known, class Take>
-bool RecordedCurves::each_new_state(Known& known, std::int64_t until_tick, const Take& take) {
-  const std::vector<recorder::StateIndex::Entry>& all = index_.states();
-  const std::size_t step = stride(all.size(), kStateBytesPerRobot * reader_.header().robots());
-  std::erase_if(known, [step](const auto& state) { return state.first % step != 0; });
+bool RecordedCurves::each_new(Known& known, std::span<const recorder::StateIndex::Entry> all,
+                              std::size_t entry_bytes, std::int64_t until_tick, const Take& take) {
+  const std::size_t step = stride(all.size(), entry_bytes);
+  std::erase_if(known, [step](const auto& one) { return one.first % step != 0; });
   const auto until = Clock::now() + kReadFor;
   for (std::size_t i = 0; i < all.size() && all[i].tick <= until_tick; i += step) {
     if (known.contains(i)) continue;
-    const proto::Record* const record = record_at(all[i].offset);
-    if (record != nullptr && record->has_state()) take(i, record->state());
+    take(i, all[i]);
     if (Clock::now() > until && i + step < all.size()) return false;
   }
   return true;
 }
 
+template <class Known, class Take>
+bool RecordedCurves::each_new_state(Known& known, std::size_t count, std::int64_t until_tick, const Take& take) {
+  return each_new(known, std::span(index_.states()).first(count), kStateBytesPerRobot * reader_.header().robots(),
+                  until_tick, [this, &take](std::size_t number, const recorder::StateIndex::Entry& entry) {
+                    const proto::Record* const record = record_at(entry.offset);
+                    if (record != nullptr && record->has_state()) take(number, record->state());
+                  });
+}
+
+RecordedCurves::Points& RecordedCurves::points_of(Curve curve, std::uint32_t variable,
+                                                  std::optional<std::uint32_t> robot) {
+  return recently_used(
+             points_, kMostKnownPoints,
+             [&](const KnownPoints& known) {
+               return known.curve == curve && known.variable == variable && known.robot == robot;
+             },
+             KnownPoints{curve, variable, robot, {}})
+      .at;
+}
+
 bool RecordedCurves::take_states() {
-  return each_new_state(states_, kEver, [this](std::size_t number, const proto::StateRecord& state) {
-    observer_.add(seconds(state.tick()), recorder::values(state.x_mm()), recorder::values(state.y_mm()),
-                  recorder::values(state.heading_rad()), recorder::values(state.movable_x_mm()),
-                  recorder::values(state.movable_y_mm()));
-    std::array<double, kNumbers>& numbers = states_[number];
-    for (std::size_t o = 0; o < recorder::kObservables.size(); ++o) numbers[o] = observer_.curves().value[o].back();
-    const auto count = [&numbers](std::size_t place, const std::string& octets, auto holds) {
-      numbers[recorder::kObservables.size() + place] = static_cast<double>(std::count_if(
-          octets.begin(), octets.end(), [&](char octet) { return holds(static_cast<std::uint8_t>(octet)); }));
-    };
-    const auto is = [](LifeCycle wanted) {
-      return [wanted](std::uint8_t life) { return life == static_cast<std::uint8_t>(wanted); };
-    };
-    count(0, state.life_cycle(), is(LifeCycle::kRunning));
-    count(1, state.life_cycle(), is(LifeCycle::kFailed));
-    count(2, state.led(), [](std::uint8_t led) { return led != 0; });
-  });
+  return each_new_state(
+      states_, index_.states().size(), kEver, [this](std::size_t number, const proto::StateRecord& state) {
+        observer_.add(seconds(state.tick()), recorder::values(state.x_mm()), recorder::values(state.y_mm()),
+                      recorder::values(state.heading_rad()), recorder::values(state.movable_x_mm()),
+                      recorder::values(state.movable_y_mm()));
+        std::array<double, kNumbers>& numbers = states_[number];
+        for (std::size_t o = 0; o < recorder::kObservables.size(); ++o)
+          numbers[o] = observer_.curves().value[o].back();
+        const auto count = [&numbers](std::size_t place, const std::string& octets, auto holds) {
+          numbers[recorder::kObservables.size() + place] = static_cast<double>(std::count_if(
+              octets.begin(), octets.end(), [&](char octet) { return holds(static_cast<std::uint8_t>(octet)); }));
+        };
+        const auto is = [](LifeCycle wanted) {
+          return [wanted](std::uint8_t life) { return life == static_cast<std::uint8_t>(wanted); };
+        };
+        count(0, state.life_cycle(), is(LifeCycle::kRunning));
+        count(1, state.life_cycle(), is(LifeCycle::kFailed));
+        count(2, state.led(), [](std::uint8_t led) { return led != 0; });
+      });
 }
 
 RecordedCurves::Curves RecordedCurves::of_states(const Plot& plot) {
@@ -232,15 +262,16 @@ bool RecordedCurves::take_own() {
     const std::vector<recorder::StateIndex::Entry>& all = index_.variable(v);
     settled = std::min(settled, all.empty() ? -1 : all.back().tick - kSettled_ticks);
   }
-  return each_new_state(own_values_, settled, [this](std::size_t number, const proto::StateRecord& read) {
-    const proto::StateRecord state = read;  // reading variables takes the reader's memory
-    take_variables_until(state.tick());
-    const double time_s = seconds(state.tick());
-    own_observer_.add(time_s, recorder::values(state.x_mm()), recorder::values(state.y_mm()),
-                      recorder::values(state.heading_rad()), recorder::values(state.movable_x_mm()),
-                      recorder::values(state.movable_y_mm()));
-    own_values_[number] = own_->values(time_s, state, own_observer_.curves());
-  });
+  return each_new_state(
+      own_values_, index_.states().size(), settled, [this](std::size_t number, const proto::StateRecord& read) {
+        const proto::StateRecord state = read;  // reading variables takes the reader's memory
+        take_variables_until(state.tick());
+        const double time_s = seconds(state.tick());
+        own_observer_.add(time_s, recorder::values(state.x_mm()), recorder::values(state.y_mm()),
+                          recorder::values(state.heading_rad()), recorder::values(state.movable_x_mm()),
+                          recorder::values(state.movable_y_mm()));
+        own_values_[number] = own_->values(time_s, state, own_observer_.curves());
+      });
 }
 
 RecordedCurves::Curves RecordedCurves::of_own(std::size_t number) {
@@ -255,70 +286,109 @@ RecordedCurves::Curves RecordedCurves::of_own(std::size_t number) {
   return curves;
 }
 
-RecordedCurves::Curves RecordedCurves::of_displacement(std::uint32_t robot) {
-  if (places_.robot != robot) places_ = {robot, {}};
-  Curves curves{{}, {"value"}, {{}}};
-  curves.whole =
-      each_new_state(places_.at, kEver, [this, robot](std::size_t number, const proto::StateRecord& state) {
-        const auto i = static_cast<int>(robot);
-        places_.at[number] = {state.x_mm(i), state.y_mm(i)};
+bool RecordedCurves::take_places(Points& points, std::uint32_t robot, std::size_t states) {
+  return each_new_state(
+      points, states, kEver,
+      [&points, i = static_cast<int>(robot)](std::size_t number, const proto::StateRecord& state) {
+        points[number] = {state.x_mm(i), state.y_mm(i)};
       });
-  for (const auto& [number, place] : places_.at) {
-    const std::array<double, 2>& first = places_.at.begin()->second;
+}
+
+RecordedCurves::Curves RecordedCurves::of_displacement(std::uint32_t robot) {
+  Points& points = points_of(Curve::kPath, 0, robot);
+  Curves curves{{}, {"value"}, {{}}};
+  curves.whole = take_places(points, robot, index_.states().size());
+  for (const auto& [number, place] : points) {
+    const std::array<double, 3>& first = points.begin()->second;
     curves.time_s.push_back(seconds(index_.states()[number].tick));
     curves.values[0].push_back(std::hypot(place[0] - first[0], place[1] - first[1]));
   }
   return curves;
 }
 
-RecordedCurves::Curves RecordedCurves::of_variable(std::uint32_t variable, std::optional<std::uint32_t> robot) {
-  const std::vector<recorder::StateIndex::Entry>& all = index_.variable(variable);
-  Curves curves;
-  curves.names = robot ? std::vector<std::string>{"value"} : std::vector<std::string>{"mean", "min", "max"};
-  curves.values.resize(curves.names.size());
-  // Records of one tick belong together.
-  std::vector<std::size_t> firsts;
-  for (std::size_t i = 0; i < all.size(); ++i)
-    if (i == 0 || all[i].tick != all[i - 1].tick) firsts.push_back(i);
-  const std::size_t step = stride(firsts.size(), kValueBytesPerRobot * reader_.header().robots());
-  for (std::size_t number = 0; number < firsts.size(); number += step) {
-    const std::int64_t tick = all[firsts[number]].tick;
-    double sum = 0, least = kNothing, largest = kNothing, value = kNothing;
-    std::size_t count = 0;
-    for (std::size_t i = firsts[number]; i < all.size() && all[i].tick == tick; ++i) {
-      const proto::Record* const record = record_at(all[i].offset);
-      if (record == nullptr || !record->has_variable()) continue;
-      if (robot) {
-        if (const int place = place_of(record->variable(), *robot); place >= 0)
-          value = number_in(record->variable(), place);
-        continue;
-      }
-      for (int k = 0; k < record->variable().robot_size(); ++k) {
-        const double one = number_in(record->variable(), k);
-        if (!std::isfinite(one)) continue;
-        sum += one;
-        least = std::fmin(least, one);
-        largest = std::fmax(largest, one);
-        ++count;
-      }
-    }
-    curves.time_s.push_back(seconds(tick));
+std::string RecordedCurves::trail(std::uint32_t robot, std::int64_t tick) {
+  Points& points = points_of(Curve::kTrail, 0, robot);
+  const std::size_t last = index_.at_or_before(tick);
+  const bool whole = take_places(points, robot, last + 1);
+  // It ends at the tick, also where the curve leaves out the state there.
+  if (const proto::Record* const record = record_at(index_.states()[last].offset);
+      record != nullptr && record->has_state())
+    points[last] = {record->state().x_mm(static_cast<int>(robot)), record->state().y_mm(static_cast<int>(robot))};
+  std::vector<double> xy_mm;
+  const std::array<double, 3>* before = nullptr;
+  double before_s = 0;
+  for (const auto& [number, place] : points) {
+    if (number > last) break;
+    const double time_s = seconds(index_.states()[number].tick);
+    if (before != nullptr &&
+        std::hypot(place[0] - (*before)[0], place[1] - (*before)[1]) > furthest_mm(time_s - before_s))
+      xy_mm.insert(xy_mm.end(), {kNothing, kNothing});
+    xy_mm.insert(xy_mm.end(), {place[0], place[1]});
+    before = &place;
+    before_s = time_s;
+  }
+  return trail_text(robot, xy_mm, whole);
+}
+
+/// Of a robot its value; of the swarm mean, least and largest value. `of_tick`: the variable's records of one tick.
+std::array<double, 3> RecordedCurves::values_at(std::span<const recorder::StateIndex::Entry> of_tick,
+                                                std::optional<std::uint32_t> robot) {
+  double sum = 0, least = kNothing, largest = kNothing, value = kNothing;
+  std::size_t count = 0;
+  for (const recorder::StateIndex::Entry& entry : of_tick) {
+    const proto::Record* const record = record_at(entry.offset);
+    if (record == nullptr || !record->has_variable()) continue;
     if (robot) {
-      curves.values[0].push_back(value);
-    } else {
-      curves.values[0].push_back(count > 0 ? sum / static_cast<double>(count) : kNothing);
-      curves.values[1].push_back(least);
-      curves.values[2].push_back(largest);
+      if (const int place = place_of(record->variable(), *robot); place >= 0)
+        value = number_in(record->variable(), place);
+      continue;
+    }
+    for (int k = 0; k < record->variable().robot_size(); ++k) {
+      const double one = number_in(record->variable(), k);
+      if (!std::isfinite(one)) continue;
+      sum += one;
+      least = std::fmin(least, one);
+      largest = std::fmax(largest, one);
+      ++count;
     }
   }
+  if (robot) return {value, kNothing, kNothing};
+  return {count > 0 ? sum / static_cast<double>(count) : kNothing, least, largest};
+}
+
+RecordedCurves::Curves RecordedCurves::of_variable(std::uint32_t variable, std::optional<std::uint32_t> robot) {
+  using Entry = recorder::StateIndex::Entry;
+  const std::vector<Entry>& all = index_.variable(variable);
+  // Records of one tick belong together: an entry's offset is the position of the first one here.
+  std::vector<Entry> ticks;
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (i == 0 || all[i].tick != all[i - 1].tick) ticks.push_back({all[i].tick, i});
+  Points& points = points_of(Curve::kVariable, variable, robot);
+  Curves curves;
+  curves.whole =
+      each_new(points, ticks, kValueBytesPerRobot * reader_.header().robots(), kEver,
+               [&](std::size_t number, const Entry& tick) {
+                 const std::size_t end = number + 1 < ticks.size() ? ticks[number + 1].offset : all.size();
+                 points[number] = values_at(std::span(all).subspan(tick.offset, end - tick.offset), robot);
+               });
+  curves.names = robot ? std::vector<std::string>{"value"} : std::vector<std::string>{"mean", "min", "max"};
+  curves.values.resize(curves.names.size());
+  for (const auto& [number, values] : points) {
+    curves.time_s.push_back(seconds(ticks[number].tick));
+    for (std::size_t i = 0; i < curves.values.size(); ++i) curves.values[i].push_back(values[i]);
+  }
+  // Of a recording that grows, a host's records of the last ticks may still come.
+  if (!index_.ended() && !all.empty())
+    std::erase_if(points,
+                  [&](const auto& one) { return ticks[one.first].tick > all.back().tick - kSettled_ticks; });
   return curves;
 }
 
 RecordedCurves::EventCounts& RecordedCurves::counts_of(std::uint32_t kind, std::optional<std::uint32_t> robot) {
-  for (EventCounts& counts : event_counts_)
-    if (counts.kind == kind && counts.robot == robot) return counts;
-  if (event_counts_.size() >= kMostEventCounts) event_counts_.pop_front();
-  return event_counts_.emplace_back(EventCounts{kind, robot, {}});
+  return recently_used(
+      event_counts_, kMostEventCounts,
+      [&](const EventCounts& counts) { return counts.kind == kind && counts.robot == robot; },
+      EventCounts{kind, robot, {}});
 }
 
 /// The number of events so far. Every event counts, also where the curve has fewer points.

@@ -1,17 +1,18 @@
 /// RecordedCurves: what the page can plot of a recording, as curves over time. A recording may still grow.
 ///
 /// A curve has kMostPoints points at most, and reads so much of the file at most that a viewer never waits for long. Where there
-/// are more states, it takes every second, fourth, eighth... of them. The observables that the experiment names are evaluated for
+/// are more states, it takes every second, fourth, eighth... of them. One answer reads for 40 ms at most; another call continues. The observables that the experiment names are evaluated for
 /// these states; of a recording that grows, those that use variables end some seconds before its last state.
 #pragma once
 
 #include <array>
 #include <chrono>
 #include <cstdint>
-#include <deque>
+#include <list>
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,8 @@ class RecordedCurves {
   /// A message of type "plot". Of the swarm, variables have their mean, least and largest value. Where `whole` is false in it, it
   /// took too long to read all; another call continues. Empty: there is no such plot.
   [[nodiscard]] std::string plot(std::uint32_t number, std::optional<std::uint32_t> robot);
+  /// A message of type "trail": where a robot was up to a tick. It is continued as a plot is.
+  [[nodiscard]] std::string trail(std::uint32_t robot, std::int64_t tick);
   /// The last recorded value of a variable of a robot up to a tick; nothing where there is none.
   [[nodiscard]] std::optional<double> value(std::uint32_t variable, std::uint32_t robot, std::int64_t tick);
 
@@ -69,16 +72,28 @@ class RecordedCurves {
     std::vector<std::uint64_t> up_to;
   };
 
-  /// Numbers of a robot per state: its place, mm.
-  struct RobotPlaces {
-    std::optional<std::uint32_t> robot;
-    std::map<std::size_t, std::array<double, 2>> at;  ///< by number of the state
+  /// What was read for one curve: up to three numbers, by number of the state or of the variable's tick.
+  using Points = std::map<std::size_t, std::array<double, 3>>;
+  enum class Curve : std::uint8_t { kPath, kTrail, kVariable };
+  struct KnownPoints {
+    Curve curve;
+    std::uint32_t variable;              ///< of kVariable
+    std::optional<std::uint32_t> robot;  ///< nothing: of the swarm
+    Points at;
   };
 
-  /// Calls take(number, state) for each state up to a tick that a curve needs and that `known` does not hold; forgets the others
-  /// that it holds. False: it took too long, and another call continues.
+  /// Calls take(number, entry) for each of the entries up to a tick that a curve needs and that `known` does not hold; forgets the
+  /// others that it holds. `entry_bytes`: what it reads for one. False: it took too long, and another call continues.
   template <class Known, class Take>
-  [[nodiscard]] bool each_new_state(Known& known, std::int64_t until, const Take& take);
+  [[nodiscard]] bool each_new(Known& known, std::span<const recorder::StateIndex::Entry> all,
+                              std::size_t entry_bytes, std::int64_t until_tick, const Take& take);
+  /// The same for the first `count` states: take(number, state).
+  template <class Known, class Take>
+  [[nodiscard]] bool each_new_state(Known& known, std::size_t count, std::int64_t until_tick, const Take& take);
+  [[nodiscard]] bool take_places(Points& points, std::uint32_t robot, std::size_t states);
+  [[nodiscard]] Points& points_of(Curve curve, std::uint32_t variable, std::optional<std::uint32_t> robot);
+  [[nodiscard]] std::array<double, 3> values_at(std::span<const recorder::StateIndex::Entry> of_tick,
+                                                std::optional<std::uint32_t> robot);
   [[nodiscard]] bool take_states();
   [[nodiscard]] bool take_own();
   void take_variables_until(std::int64_t tick);
@@ -101,9 +116,9 @@ class RecordedCurves {
   recorder::ObservableObserver own_observer_;
   std::map<std::size_t, std::vector<double>> own_values_;  // by number of the state
   std::vector<std::size_t> variables_taken_;               // per variable: entries of the index that own_ knows
-  RobotPlaces places_;                                     // of the robot that was asked for last
+  std::list<KnownPoints> points_;                          // the one that was used last is the first
   std::map<std::pair<std::uint32_t, std::int64_t>, Answer> answers_;
-  std::deque<EventCounts> event_counts_;
+  std::list<EventCounts> event_counts_;  // the one that was used last is the first
 };
 
 }  // namespace kilotwin::view

@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "clients/recorder/summary.hpp"
 #include "clients/recorder/tracker_records.hpp"
 #include "clients/view/flights.hpp"
+#include "clients/view/recently_used.hpp"
 #include "clients/view/robot_log.hpp"
 #include "clients/view/watched_plan.hpp"
 #include "clients/view/work.hpp"
@@ -23,15 +26,14 @@ namespace {
 
 using recorder::StateIndex;
 
-/// A trail has so many points at most, and reads so many bytes of states at most.
-constexpr std::size_t kTrailPoints = 400, kTrailBytes = 48'000'000, kStateBytesPerRobot = 26;
 /// A place that a tracker stated is shown for so long. Records that one answer reads at most.
 constexpr double kPlaceHolds_s = 1;
+/// Robots that were heard within this time have a line to the one that heard them.
+constexpr double kLately_s = 3;
 constexpr std::size_t kMostSamples = 128;
 /// Inputs that one answer reads at most, and marks of a time line.
 constexpr std::size_t kMostInputs = 4000, kMostMarks = 500;
-/// Pairs of robots that are listed for one robot.
-constexpr std::size_t kMostPartners = 8;
+constexpr std::size_t kMostWholeRuns = 64;
 
 fs::path recording_of(const fs::path& run) {
   return recorder::RunDirectory::open(run, recorder::RunDirectory::Needs::kRecording).recording();
@@ -66,16 +68,6 @@ std::vector<bool> firmware_of(const proto::Manifest& manifest) {
 
 std::span<const std::uint8_t> octets(const std::string& bytes) {
   return {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()};
-}
-
-/// The robots that `robot` exchanged most messages with: {"robot", "count"} in descending order.
-nlohmann::json partners(const std::map<std::uint32_t, std::uint32_t>& counts) {
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> list(counts.begin(), counts.end());
-  std::stable_sort(list.begin(), list.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
-  if (list.size() > kMostPartners) list.resize(kMostPartners);
-  nlohmann::json text = nlohmann::json::array();
-  for (const auto& [robot, count] : list) text.push_back({{"robot", robot}, {"count", count}});
-  return text;
 }
 
 }  // namespace
@@ -193,36 +185,35 @@ std::string RecordedRun::floors_at(std::int64_t tick) {
 std::string RecordedRun::trail(std::uint32_t robot, std::int64_t tick) {
   const std::lock_guard lock(mutex_);
   if (robot >= reader_.header().robots()) return notice_text(fmt::format("There is no robot {}.", robot));
-  const std::size_t affordable =
-      std::clamp<std::size_t>(kTrailBytes / (kStateBytesPerRobot * reader_.header().robots()), 2, kTrailPoints);
-  const std::size_t last = index_.at_or_before(tick);
-  const std::size_t stride = last / affordable + 1;
-  std::vector<double> xy_mm;
-  // The last point is the state at the tick.
-  for (std::size_t number = last % stride; number <= last; number += stride) {
-    const proto::StateRecord* const at = state(number);
-    if (at == nullptr) continue;
-    xy_mm.push_back(at->x_mm(static_cast<int>(robot)));
-    xy_mm.push_back(at->y_mm(static_cast<int>(robot)));
-  }
-  return trail_text(robot, xy_mm);
+  return curves_.trail(robot, tick);
 }
 
-std::string RecordedRun::robot(std::uint32_t robot) {
-  const std::lock_guard lock(mutex_);
-  if (robot >= reader_.header().robots()) return notice_text(fmt::format("There is no robot {}.", robot));
-  nlohmann::json text{{"type", "robot"}, {"robot", robot}};
+/// Robots whose messages it received shortly before.
+std::set<std::uint32_t> RecordedRun::heard_lately(std::uint32_t robot, std::int64_t tick) {
+  const auto shortly = static_cast<std::int64_t>(kLately_s / reader_.tick_length().seconds());
+  std::set<std::uint32_t> senders;
+  static_cast<void>(each_event_back(proto::RECEIVED, tick - shortly, tick, [&](const proto::EventRecord& event) {
+    for (int i = 0; i < std::min(event.robot_size(), event.sender_size()); ++i)
+      if (event.robot(i) == robot) senders.insert(event.sender(i));
+    return true;
+  }));
+  return senders;
+}
+
+/// Counts of the radio and of pairs of robots, as a JSON object.
+std::string RecordedRun::of_whole_run(std::uint32_t robot) {
+  nlohmann::json text = nlohmann::json::object();
   const auto i = static_cast<int>(robot);
   if (index_.radio()) {
     const proto::Record* const record = record_at(*index_.radio());
     if (record != nullptr && record->has_radio() && i < record->radio().attempted_size()) {
       const proto::RadioRecord& radio = record->radio();
       const auto at = [i](const auto& column) { return i < column.size() ? column[i] : 0u; };
-      text["radio"] = {{"attempted", at(radio.attempted())},
-                       {"sent", at(radio.sent())},
-                       {"received", at(radio.received())},
-                       {"collided", at(radio.collided())},
-                       {"backedOff", at(radio.backed_off())}};
+      text = {{"attempted", at(radio.attempted())},
+              {"sent", at(radio.sent())},
+              {"received", at(radio.received())},
+              {"collided", at(radio.collided())},
+              {"backedOff", at(radio.backed_off())}};
     }
   }
   if (index_.messages()) {
@@ -239,6 +230,30 @@ std::string RecordedRun::robot(std::uint32_t robot) {
       text["heardBy"] = partners(heard_by);
     }
   }
+  return text.dump();
+}
+
+std::string RecordedRun::robot(std::uint32_t robot, std::int64_t tick) { return this->robot(robot, tick, {}); }
+
+std::string RecordedRun::robot(std::uint32_t robot, std::int64_t tick,
+                               const std::optional<std::set<std::uint32_t>>& lately) {
+  const std::lock_guard lock(mutex_);
+  if (robot >= reader_.header().robots()) return notice_text(fmt::format("There is no robot {}.", robot));
+  nlohmann::json text{{"type", "robot"}, {"robot", robot}, {"tick", tick}};
+  const MessageCounts counts = messages_.until(robot, tick);
+  text["whole"] = counts.whole;
+  if (counts.sent) text["sent"] = *counts.sent;
+  if (counts.received) {
+    text["received"] = *counts.received;
+    text["heard"] = partners(counts.heard);
+    text["lately"] = lately ? *lately : heard_lately(robot, tick);
+  }
+  // Of the whole run, once it has ended; all pairs of robots are read for it.
+  WholeRun& known = recently_used(
+      whole_runs_, kMostWholeRuns, [robot](const WholeRun& one) { return one.robot == robot; },
+      WholeRun{robot, {}});
+  if (known.text.empty() && index_.ended()) known.text = of_whole_run(robot);
+  if (!known.text.empty()) text["run"] = nlohmann::json::parse(known.text);
   return text.dump();
 }
 
@@ -337,26 +352,45 @@ std::vector<ShownPacket> RecordedRun::packets_until(std::int64_t tick) {
   return {newest_first.rbegin(), newest_first.rend()};
 }
 
+/// Calls take(event) for the records of a kind from a tick back to another one, until it returns false. An event's record is of the
+/// tick in which the packet ended. False: there are more.
+template <class Take>
+bool RecordedRun::each_event_back(std::uint32_t kind, std::int64_t from, std::int64_t tick, const Take& take) {
+  const std::vector<StateIndex::Entry>& all = index_.events(kind);
+  auto at = std::upper_bound(all.begin(), all.end(), tick,
+                             [](std::int64_t wanted, const auto& entry) { return wanted < entry.tick; });
+  for (std::size_t read = 0; at != all.begin(); ++read) {
+    if ((--at)->tick < from) return true;
+    if (read == kMostSamples) return false;
+    const proto::Record* const record = record_at(at->offset);
+    if (record != nullptr && record->has_event() && !take(record->event())) return false;
+  }
+  return true;
+}
+
 std::string RecordedRun::flights(std::int64_t from, std::int64_t tick) {
   const std::lock_guard lock(mutex_);
-  std::vector<Flight> flights;
-  std::size_t read = 0;
-  for (const proto::RecordedEvent kind : {proto::RECEIVED, proto::SENT}) {
-    const std::vector<StateIndex::Entry>& all = index_.events(kind);
-    // An event's record is of the tick in which the packet ended.
-    auto at = std::upper_bound(all.begin(), all.end(), tick,
-                               [](std::int64_t wanted, const auto& entry) { return wanted < entry.tick; });
-    for (; at != all.begin() && flights.size() < kMostFlights && read < kMostSamples; ++read) {
-      if ((--at)->tick < from) break;
-      const proto::Record* const record = record_at(at->offset);
-      if (record != nullptr && record->has_event()) add_flights(record->event(), reader_.tick_length(), flights);
-    }
+  // Each kind reads its own records, so that many of one kind hide none of the other.
+  constexpr std::array kKinds{proto::RECEIVED, proto::SENT};
+  std::array<std::vector<Flight>, kKinds.size()> of;
+  bool whole = true;
+  for (std::size_t k = 0; k < kKinds.size(); ++k) {
+    whole &= each_event_back(kKinds[k], from, tick, [&](const proto::EventRecord& event) {
+      add_flights(event, reader_.tick_length(), of[k]);
+      return of[k].size() <= kMostFlights;
+    });
+    std::erase_if(of[k], [from, tick](const Flight& flight) {
+      return !(flight.tick > static_cast<double>(from) && flight.tick <= static_cast<double>(tick));
+    });
   }
-  std::erase_if(flights, [from, tick](const Flight& flight) {
-    return !(flight.tick > static_cast<double>(from) && flight.tick <= static_cast<double>(tick));
-  });
-  const bool whole = flights.size() <= kMostFlights && read < kMostSamples;
-  if (flights.size() > kMostFlights) flights.resize(kMostFlights);
+  std::vector<Flight> flights;
+  const std::size_t least = kMostFlights / kKinds.size();
+  for (std::size_t k = 0; k < kKinds.size(); ++k) {
+    const std::size_t others = std::min(of[1 - k].size(), least);
+    const std::size_t count = std::min(of[k].size(), kMostFlights - others);
+    whole &= count == of[k].size();
+    flights.insert(flights.end(), of[k].begin(), of[k].begin() + static_cast<std::ptrdiff_t>(count));
+  }
   return flights_text({from, tick, static_cast<double>(tick), whole}, flights);
 }
 

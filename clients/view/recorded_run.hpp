@@ -2,8 +2,11 @@
 #pragma once
 
 #include <filesystem>
+#include <list>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <set>
 
 #include "clients/recorder/reader.hpp"
 #include "clients/recorder/run_directory.hpp"
@@ -12,6 +15,7 @@
 #include "clients/view/gateway.hpp"
 #include "clients/view/outside.hpp"
 #include "clients/view/recorded_curves.hpp"
+#include "clients/view/robot_messages.hpp"
 #include "clients/view/run_text.hpp"
 #include "core/plan/plan.hpp"
 
@@ -30,6 +34,8 @@ class RecordedRun : public Answers {
   [[nodiscard]] std::size_t states() const;
   /// Lines of the residual monitor up to a tick.
   [[nodiscard]] std::vector<std::string> alarms_until(std::int64_t tick) const;
+  /// The events SENT or RECEIVED are recorded.
+  [[nodiscard]] bool counts_messages() const { return messages_.any(); }
   [[nodiscard]] std::uint64_t run() const { return reader_.header().run(); }
   [[nodiscard]] const std::string& name() const { return reader_.header().name(); }
   [[nodiscard]] std::uint32_t robots() const { return reader_.header().robots(); }
@@ -39,7 +45,10 @@ class RecordedRun : public Answers {
   [[nodiscard]] std::uint64_t floors_version(std::int64_t tick) override;
   [[nodiscard]] std::string floors_at(std::int64_t tick) override;
   [[nodiscard]] std::string trail(std::uint32_t robot, std::int64_t tick) override;
-  [[nodiscard]] std::string robot(std::uint32_t robot) override;
+  [[nodiscard]] std::string robot(std::uint32_t robot, std::int64_t tick) override;
+  /// The same, where the caller knows whom it has heard lately.
+  [[nodiscard]] std::string robot(std::uint32_t robot, std::int64_t tick,
+                                  const std::optional<std::set<std::uint32_t>>& lately);
   [[nodiscard]] std::string plots() override;
   [[nodiscard]] std::string plot(std::uint32_t number, std::optional<std::uint32_t> robot) override;
   [[nodiscard]] std::string program(std::uint32_t robot, std::int64_t tick) override;
@@ -52,6 +61,14 @@ class RecordedRun : public Answers {
  private:
   [[nodiscard]] const proto::StateRecord* state(std::size_t number);
   [[nodiscard]] const proto::Record* record_at(std::uint64_t offset);
+  template <class Take>
+  [[nodiscard]] bool each_event_back(std::uint32_t kind, std::int64_t from, std::int64_t tick, const Take& take);
+  struct WholeRun {
+    std::uint32_t robot;
+    std::string text;  ///< empty: the run goes on
+  };
+  [[nodiscard]] std::string of_whole_run(std::uint32_t robot);
+  [[nodiscard]] std::set<std::uint32_t> heard_lately(std::uint32_t robot, std::int64_t tick);
   [[nodiscard]] std::vector<TrackedPlace> places_at(std::int64_t tick);
   [[nodiscard]] std::vector<ShownPacket> packets_until(std::int64_t tick);
 
@@ -59,12 +76,14 @@ class RecordedRun : public Answers {
   recorder::Reader reader_;
   recorder::StateIndex index_;
   RecordedCurves curves_{reader_, index_};
+  RobotMessages messages_{reader_, index_};
   std::filesystem::path logs_of_;  // the run directory; empty: the recording stands alone
   std::unique_ptr<const proto::Experiment> experiment_;
   std::shared_ptr<const RunPlan> plan_;  // nullptr: the recording does not say enough
   std::vector<Mark> marks_;              // of the inputs that were read
   std::size_t inputs_read_ = 0;
-  std::string work_;  // the answer, once the run has ended
+  std::list<WholeRun> whole_runs_;  // the one that was used last is the first
+  std::string work_;                // the answer, once the run has ended
   std::vector<bool> firmware_;
   bool federated_ = false;
   PositionGrid grid_;

@@ -15,7 +15,7 @@ namespace {
 using nlohmann::json;
 using Kind = Request::Kind;
 
-constexpr std::array<std::pair<std::string_view, Kind>, 18> kKinds{{{"hello", Kind::kHello},
+constexpr std::array<std::pair<std::string_view, Kind>, 19> kKinds{{{"hello", Kind::kHello},
                                                                     {"next", Kind::kNext},
                                                                     {"at", Kind::kAt},
                                                                     {"trail", Kind::kTrail},
@@ -25,6 +25,7 @@ constexpr std::array<std::pair<std::string_view, Kind>, 18> kKinds{{{"hello", Ki
                                                                     {"program", Kind::kProgram},
                                                                     {"outside", Kind::kOutside},
                                                                     {"flights", Kind::kFlights},
+                                                                    {"floors", Kind::kFloors},
                                                                     {"work", Kind::kWork},
                                                                     {"marks", Kind::kMarks},
                                                                     {"overhead", Kind::kOverhead},
@@ -93,17 +94,18 @@ bool take_fields(const json& object, Request& request) {
       return true;
     }
     case Kind::kAt: return take(object, "tick", 0, request.tick) && take(object, "request", 1, request.number);
-    case Kind::kTrail: return take(object, "tick", 0, request.tick) && take(object, "robot", 0, request.robot);
+    case Kind::kTrail:
+    case Kind::kRobot:
+    case Kind::kProgram: return take(object, "tick", 0, request.tick) && take(object, "robot", 0, request.robot);
+    case Kind::kFloors:
     case Kind::kOutside: return take(object, "tick", 0, request.tick);
     case Kind::kFlights: return take(object, "from", -1, request.from) && take(object, "tick", 0, request.tick);
     case Kind::kPlace: return take_place(object, request.place);
     case Kind::kOverhead: return take_packet(object, request.packet);
-    case Kind::kProgram: return take(object, "tick", 0, request.tick) && take(object, "robot", 0, request.robot);
     case Kind::kPlot:
       request.of_robot = object.contains("robot");
       return take(object, "plot", 0, request.number) &&
              (!request.of_robot || take(object, "robot", 0, request.robot));
-    case Kind::kRobot: return take(object, "robot", 0, request.robot);
     case Kind::kStep: return take(object, "steps", 1, request.steps) && request.steps <= kMostSteps;
     default: return true;
   }

@@ -4,12 +4,13 @@
 ///   {"do": "next"}                       the next state of a live run, once
 ///   {"do": "at", "tick": T, "request": N}    the recorded state at or before tick T
 ///   {"do": "trail", "robot": R, "tick": T}   the recorded path of a robot up to tick T
-///   {"do": "robot", "robot": R}          counters of a robot
+///   {"do": "robot", "robot": R, "tick": T}   counters of a robot up to tick T
 ///   {"do": "plots"}                      what can be plotted
 ///   {"do": "plot", "plot": P, "robot": R}    a curve over time, of a robot, or without R of the swarm
 ///   {"do": "program", "robot": R, "tick": T} variables and log of a robot's program up to tick T
 ///   {"do": "outside", "tick": T}         what trackers saw, and packets for the overhead controller, up to tick T
 ///   {"do": "flights", "from": T, "tick": T}  messages that ended after the first tick, up to the second
+///   {"do": "floors", "tick": T}          what lies on the floor of a live run, if it has changed
 ///   {"do": "work"}                       where the time of the federates goes
 ///   {"do": "marks"}                      marks of the time line
 ///   {"do": "pause"} {"do": "continue"} {"do": "step", "steps": N} {"do": "stop"}
@@ -43,6 +44,7 @@ struct Request {
     kProgram,
     kOutside,
     kFlights,
+    kFloors,
     kWork,
     kMarks,
     kPause,
@@ -54,7 +56,7 @@ struct Request {
   };
   Kind kind = Kind::kNext;
   std::string token;         ///< with kHello
-  std::int64_t tick = 0;     ///< with kAt, kTrail, kProgram, kOutside and kFlights
+  std::int64_t tick = 0;     ///< with kAt, kTrail, kRobot, kProgram, kOutside, kFlights and kFloors
   std::int64_t from = 0;     ///< with kFlights
   std::uint32_t number = 0;  ///< with kAt and kPlot
   std::uint32_t robot = 0;   ///< with kTrail, kRobot, kProgram, and kPlot if `of_robot`

@@ -172,8 +172,8 @@ std::string floors_text(const std::vector<proto::FloorRecord>& floors) {
   return text_of({{"type", "floors"}, {"floors", list}});
 }
 
-std::string trail_text(std::uint32_t robot, const std::vector<double>& xy_mm) {
-  return text_of({{"type", "trail"}, {"robot", robot}, {"xy", xy_mm}});
+std::string trail_text(std::uint32_t robot, const std::vector<double>& xy_mm, bool whole) {
+  return text_of({{"type", "trail"}, {"robot", robot}, {"whole", whole}, {"xy", xy_mm}});
 }
 
 std::string program_text(const ProgramText& program) {
@@ -194,6 +194,10 @@ std::string marks_text(const std::vector<Mark>& marks, bool whole) {
   return text_of({{"type", "marks"}, {"whole", whole}, {"marks", list}});
 }
 
-std::string notice_text(const std::string& line) { return text_of({{"type", "notice"}, {"text", line}}); }
+std::string notice_text(const std::string& line) { return refusal_text(line, /*places=*/false); }
+
+std::string refusal_text(const std::string& line, bool places) {
+  return text_of({{"type", "notice"}, {"text", line}, {"refuses", places ? "place" : ""}});
+}
 
 }  // namespace kilotwin::view

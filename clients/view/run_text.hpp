@@ -37,8 +37,9 @@ struct RunOutline {
 [[nodiscard]] PositionGrid grid_of(const proto::Experiment&);
 /// A message of type "floors": what virtual environments paint.
 [[nodiscard]] std::string floors_text(const std::vector<proto::FloorRecord>&);
-/// A message of type "trail": where a robot was, oldest first, x and y in turn.
-[[nodiscard]] std::string trail_text(std::uint32_t robot, const std::vector<double>& xy_mm);
+/// A message of type "trail": where a robot was, oldest first, x and y in turn; not finite: it was placed elsewhere in between. `whole`: false:
+/// there is more, if it is asked for again.
+[[nodiscard]] std::string trail_text(std::uint32_t robot, const std::vector<double>& xy_mm, bool whole);
 /// What a robot's program knows and has printed up to a tick.
 struct ProgramText {
   std::uint32_t robot = 0;
@@ -58,6 +59,8 @@ struct Mark {
 [[nodiscard]] std::string marks_text(const std::vector<Mark>& marks, bool whole);
 /// A message of type "notice": one line for whoever looks.
 [[nodiscard]] std::string notice_text(const std::string& line);
+/// The same, of a request to steer that the run refuses. `places`: the request was to place a body elsewhere.
+[[nodiscard]] std::string refusal_text(const std::string& line, bool places);
 
 }  // namespace view
 }  // namespace kilotwin

@@ -32,7 +32,7 @@ struct ViewArguments {
 
 /// How often a recording is looked at for new states.
 constexpr auto kLook = 200ms;
-/// Beside a run that uses all cores, the run goes first.
+/// Beside a run that uses all cores, the run goes first. A recording may be that of a run that goes on.
 constexpr int kNiceness = 10;
 
 class Viewing {
@@ -105,7 +105,7 @@ int show(const ViewArguments& arguments) {
   if (arguments.run.empty() && !arguments.domain)
     throw UserError("view: give RUN, the directory of a run, or --domain N, the domain of a live one");
   catch_interrupts();
-  if (arguments.domain) static_cast<void>(::setpriority(PRIO_PROCESS, 0, kNiceness));
+  static_cast<void>(::setpriority(PRIO_PROCESS, 0, kNiceness));
   return arguments.foxglove ? serve_foxglove(arguments) : Viewing(arguments).work();
 }
 

@@ -67,6 +67,9 @@ export class Triangles {
   }
 }
 
+/** Further than this a robot does not drive in so many seconds, mm: it was placed elsewhere. clients/view/recorded_curves.cpp. */
+export const furthest = (seconds: number): number => 20 + 60 * seconds;
+
 export function circle(x: number, y: number, radius: number, corners = 64): Point[] {
   return Array.from({ length: corners }, (_, i): Point => {
     const angle = (2 * Math.PI * i) / corners;

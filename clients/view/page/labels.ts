@@ -4,6 +4,7 @@ import { LIFE_ABSENT, lifeOf, type Frame, type Run } from "./protocol.ts";
 
 const LEAST_RADIUS_PX = 9;
 const MOST_LABELS = 600;
+const HALF_LETTER_PX = 4;
 
 export class Labels {
   readonly #canvas: HTMLCanvasElement;
@@ -19,7 +20,8 @@ export class Labels {
   draw(run: Run, frame: Frame, camera: Camera, selected: number | undefined, placeOf: (robot: number) => [number, number]): void {
     const radius = run.robotRadius * camera.pxPerMm;
     const all = radius >= LEAST_RADIUS_PX;
-    if (!all && selected === undefined && run.circles.length === 0) {
+    const tracked = run.groups.some((group) => group.kind === "tracked");
+    if (!all && selected === undefined && run.circles.length === 0 && !tracked) {
       if (!this.#empty) this.#clear();
       return;
     }
@@ -35,11 +37,13 @@ export class Labels {
     context.fillStyle = style.getPropertyValue("--text");
     for (const circle of run.circles) this.#put(circle.name, ...camera.toScreen(circle.x, circle.y + circle.radius), 0);
     let drawn = 0;
-    for (let robot = 0; all && robot < frame.robots && drawn < MOST_LABELS; ++robot) {
-      if (robot === selected || lifeOf(frame.state[robot]!) === LIFE_ABSENT) continue;
+    for (let robot = 0; (all || tracked) && robot < frame.robots && drawn < MOST_LABELS; ++robot) {
+      const lost = lifeOf(frame.state[robot]!) === LIFE_ABSENT;
+      if (!lost && (!all || robot === selected)) continue;
       const [x, y] = camera.toScreen(...placeOf(robot));
       if (x < 0 || y < 0 || x > camera.width || y > camera.height) continue;
-      this.#put(String(robot), x, y, radius);
+      if (lost) this.#put("?", x, y + HALF_LETTER_PX, -4);
+      if (all && robot !== selected) this.#put(String(robot), x, y, radius);
       ++drawn;
     }
     if (selected === undefined) return;

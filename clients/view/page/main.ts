@@ -2,6 +2,7 @@
 import { Camera } from "./camera.ts";
 import { Connection } from "./connection.ts";
 import { Flights, FLOATS } from "./flights.ts";
+import { furthest, type Point } from "./geometry.ts";
 import { Labels } from "./labels.ts";
 import { showMarks } from "./marks.ts";
 import { Mover } from "./mover.ts";
@@ -11,7 +12,7 @@ import { Playback } from "./playback.ts";
 import { ellipsesOf, messageOf, showAlarms, showPackets } from "./outside.ts";
 import { Plots } from "./plots.ts";
 import { listenToPointer } from "./pointer.ts";
-import { kindsOf, lifeOf, LIFE_ABSENT, type Frame, type MarksText, type Message, type OutsideText, type RobotCounts, type Run, type Status, type WorkText } from "./protocol.ts";
+import { kindsOf, type Frame, type MarksText, type Message, type OutsideText, type RobotCounts, type Run, type Status, type TrailText, type WorkText } from "./protocol.ts";
 import { Renderer, type Marks } from "./renderer.ts";
 import { svgOf } from "./svg.ts";
 import { Theme } from "./theme.ts";
@@ -20,12 +21,15 @@ import { showWork } from "./work.ts";
 const PANEL_EVERY_MS = 200;
 /** How often the selected robot's variables and log are asked for while time passes. */
 const PROGRAM_EVERY_MS = 400;
+const COUNTS_EVERY_MS = 400;
 const OUTSIDE_EVERY_MS = 250;
+const FLOORS_EVERY_MS = 500;
 const WORK_EVERY_MS = 1000;
 /** Marks are asked for again while not all have come, and while the recording grows. */
 const MARKS_EVERY_MS = 1000;
 const TRAIL_EVERY_S = 1;
 const TRAIL_SEGMENTS = 30;
+const MOST_TRAIL_POINTS = 2000;
 /** Swarms larger than this begin without trails. */
 const MOST_TRAILS = 5000;
 /** Robots further than this from a click are not selected. */
@@ -39,7 +43,7 @@ class Page {
   readonly #picture = element<HTMLCanvasElement>("picture");
   readonly #line = element<HTMLInputElement>("line");
   readonly #camera = new Camera();
-  readonly #renderer = new Renderer(this.#picture);
+  #renderer = new Renderer(this.#picture);
   readonly #labels = new Labels(element<HTMLCanvasElement>("labels"));
   readonly #plots: Plots = new Plots({
     send: (request) => this.#connection.send(request),
@@ -62,8 +66,10 @@ class Page {
   #status: Status | undefined;
   #counts: RobotCounts | undefined;
   #selected: number | undefined;
-  #trail: [number, number][] = [];
+  #trail: Point[][] = []; // of the selected robot, in parts
   #program: { tick: number; askedAt: number } | undefined; // what was asked for last
+  #countsAsked: { tick: number; at: number } | undefined;
+  #floorsAsked = -Infinity;
   #outside: OutsideText | undefined;
   #ellipses: [number, number][][] = [];
   #outsideAsked: { tick: number; at: number } | undefined;
@@ -73,6 +79,7 @@ class Page {
   #marksDue = true;
   #marksAsked = -Infinity;
   #mayTrail = 0; // when the trail of the selected robot may be asked for again
+  #trailTick = -1; // up to which it was asked for
   #trails = true;
   #trailFrom: Frame | undefined;
   #maySteer = false;
@@ -105,17 +112,25 @@ class Page {
 
   #connected(): void {
     showConnection("open");
-    const token = new URLSearchParams(location.hash.slice(1)).get("token") ?? sessionStorage.getItem("token");
-    if (!token) return;
-    sessionStorage.setItem("token", token);
-    this.#connection.send({ do: "hello", token });
+    this.#showToken();
+  }
+
+  /** The token leaves the address, which others may see; this tab remembers it, also when it is loaded again. */
+  #showToken(): void {
+    const given = new URLSearchParams(location.hash.slice(1)).get("token");
+    if (given) {
+      sessionStorage.setItem("token", given);
+      history.replaceState(null, "", location.pathname + location.search);
+    }
+    const token = sessionStorage.getItem("token");
+    if (token) this.#connection.send({ do: "hello", token });
   }
 
   #lost(): void {
     showConnection("lost");
     this.#playback.lost();
     this.#plots.lost();
-    this.#program = this.#outsideAsked = undefined;
+    this.#program = this.#outsideAsked = this.#countsAsked = undefined;
     this.#flights.forget();
     this.#mover.refused();
   }
@@ -156,13 +171,11 @@ class Page {
           showMarks(this.#timeMarks, this.#run, (tick) => this.#seek(tick));
         }
         this.#marksDue = true;
+        this.#countsAsked = undefined;
         return;
       case "floors": return this.#renderer.setFloors(message.floors);
       case "trail":
-        if (message.robot === this.#selected) {
-          this.#trail = [];
-          for (let i = 0; i + 1 < message.xy.length; i += 2) this.#trail.push([message.xy[i]!, message.xy[i + 1]!]);
-        }
+        if (message.robot === this.#selected) this.#takeTrail(message);
         return;
       case "robot":
         this.#counts = message;
@@ -171,7 +184,7 @@ class Page {
         this.#maySteer = message.steer;
         return this.#buttons();
       case "notice":
-        this.#mover.refused();
+        if (message.refuses === "place") this.#mover.refused();
         return notice(message.text);
     }
   }
@@ -209,7 +222,7 @@ class Page {
     element("speed").parentElement!.hidden = this.#playback.live;
     element("back").hidden = this.#playback.live;
     this.#picture.setAttribute("aria-label", `The arena of ${run.name} from above, ${run.robots} robots`);
-    if (this.#selected !== undefined) this.#connection.send({ do: "robot", robot: this.#selected });
+    this.#countsAsked = undefined;
     this.#buttons();
   }
 
@@ -225,6 +238,16 @@ class Page {
   }
 
   // Drawing.
+
+  /** Nothing that the graphics memory held is there any more, except trails all of it is made again. */
+  #restorePicture(): void {
+    const { floors } = this.#renderer;
+    this.#renderer = new Renderer(this.#picture);
+    if (this.#run) this.#renderer.begin(this.#run, kindsOf(this.#run));
+    this.#renderer.setFloors(floors);
+    this.#shown = undefined;
+    this.#stale = true;
+  }
 
   #tick(now: number): void {
     requestAnimationFrame((next) => this.#tick(next));
@@ -271,7 +294,7 @@ class Page {
   }
 
   #marks(selected: [number, number] | undefined): Marks {
-    const trail = selected && this.#trail.length > 0 ? [...this.#trail, selected] : [];
+    const trail = selected && this.#trail.length > 0 ? [...this.#trail.slice(0, -1), ...this.#goOn(this.#trail.at(-1)!, selected)] : [];
     const range = element<HTMLInputElement>("range").checked ? (this.#run?.radioRange ?? 0) : 0;
     const place = (robot: number): [number, number] => this.#placeOf(robot);
     const flying = this.#playback.current ? this.#flights.fill(this.#playback, place, this.#selected) : 0;
@@ -280,7 +303,8 @@ class Page {
     this.counters.flights += flying;
     this.counters.handOvers = this.#handOvers.count;
     this.counters.held = this.#mover.held ? `${this.#mover.held.movable ? "object" : "robot"} ${this.#mover.held.body}${this.#mover.waiting ? " waits" : ""}` : "";
-    return { selected, trail, range, ellipses: this.#ellipses, flights, flashes, held: this.#mover.lines() };
+    const heard = this.#flights.shown && this.#counts?.robot === this.#selected ? (this.#counts?.lately ?? []).map(place) : [];
+    return { selected, trail, range, heard, ellipses: this.#ellipses, flights, flashes, held: this.#mover.lines() };
   }
 
   /** Where a robot is drawn, mm. */
@@ -306,18 +330,47 @@ class Page {
       this.#renderer.forgetTrails();
       this.#trailFrom = frame;
     } else if (from && passed >= TRAIL_EVERY_S) {
-      if (this.#trails) this.#renderer.addTrailSegment(from, frame, TRAIL_SEGMENTS);
+      if (this.#trails) this.#renderer.addTrailSegment(from, frame, TRAIL_SEGMENTS, furthest(passed));
+      if (this.#playback.live && this.#selected !== undefined) this.#lengthenTrail(this.#placeOf(this.#selected));
       this.#trailFrom = frame;
-      if (this.#playback.live && this.#selected !== undefined) this.#trail.push(this.#placeOf(this.#selected));
-      if (this.#trail.length > 2000) this.#trail = this.#trail.filter((_, i) => i % 2 === 0);
     }
     if (!this.#playback.live) this.#askTrail();
+  }
+
+  /** The last part of a trail and a further place: two parts where the robot was placed elsewhere in between. */
+  #goOn(part: Point[], place: Point): Point[][] {
+    const [x, y] = part.at(-1)!;
+    const from = this.#trailFrom;
+    const passed = from && this.#shown ? Math.abs(this.#shown.tick - from.tick) * this.#run!.tickSeconds : 0;
+    const near = !this.#playback.live || Math.hypot(place[0] - x, place[1] - y) <= furthest(Math.max(TRAIL_EVERY_S, passed));
+    return near ? [[...part, place]] : [part, [place]];
+  }
+
+  #lengthenTrail(place: Point): void {
+    const last = this.#trail.pop();
+    this.#trail.push(...(last ? this.#goOn(last, place) : [[place]]));
+    if (this.#trail.reduce((sum, part) => sum + part.length, 0) <= MOST_TRAIL_POINTS) return;
+    // Every second point, and the ends of parts; of the parts, the newest.
+    this.#trail = this.#trail.slice(-MOST_TRAIL_POINTS / 4).map((part) => part.filter((_, i) => i % 2 === 0 || i === part.length - 1));
+  }
+
+  #takeTrail({ xy, whole }: TrailText): void {
+    this.#trail = [];
+    for (let i = 0; i + 1 < xy.length; i += 2) {
+      const [x, y] = [xy[i], xy[i + 1]];
+      if (x == null || y == null) this.#trail.push([]);
+      else if (this.#trail.length === 0) this.#trail.push([[x, y]]);
+      else this.#trail.at(-1)!.push([x, y]);
+    }
+    this.#trail = this.#trail.filter(({ length }) => length > 0);
+    if (!whole) setTimeout(() => this.#askTrail(), Math.max(0, this.#mayTrail - performance.now()));
   }
 
   #askTrail(): void {
     if (this.#selected === undefined || performance.now() < this.#mayTrail) return;
     this.#mayTrail = performance.now() + 500;
-    this.#connection.send({ do: "trail", robot: this.#selected, tick: Math.floor(this.#playback.time) });
+    this.#trailTick = Math.floor(this.#playback.time);
+    this.#connection.send({ do: "trail", robot: this.#selected, tick: this.#trailTick });
   }
 
   #askProgram(robot: number, tick: number, now: number): void {
@@ -325,6 +378,21 @@ class Page {
     if (last && (last.tick === tick || now - last.askedAt < PROGRAM_EVERY_MS)) return;
     this.#program = { tick, askedAt: now };
     this.#connection.send({ do: "program", robot, tick });
+  }
+
+  #askCounts(robot: number, tick: number, now: number): void {
+    const last = this.#countsAsked;
+    const settled = last?.tick === tick && this.#counts?.tick === tick && this.#counts.whole;
+    if (last && (settled || now - last.at < COUNTS_EVERY_MS)) return;
+    this.#countsAsked = { tick, at: now };
+    this.#connection.send({ do: "robot", robot, tick });
+  }
+
+  /** Floors of recordings come with their states. */
+  #askFloors(tick: number, now: number): void {
+    if (!this.#playback.live || now - this.#floorsAsked < FLOORS_EVERY_MS) return;
+    this.#floorsAsked = now;
+    this.#connection.send({ do: "floors", tick });
   }
 
   #askOutside(tick: number, now: number): void {
@@ -367,8 +435,11 @@ class Page {
     if (this.#selected !== undefined) {
       showRobot(run, frame, this.#selected, this.#counts);
       this.#askProgram(this.#selected, Math.floor(time), now);
+      this.#askCounts(this.#selected, Math.floor(time), now);
+      if (!this.#playback.live && this.#trailTick !== Math.floor(time)) this.#askTrail();
     }
     this.#askOutside(Math.floor(time), now);
+    this.#askFloors(Math.floor(time), now);
     this.#askWork(now);
     this.#askMarks(now);
     this.#plots.update(now, time * run.tickSeconds);
@@ -439,7 +510,7 @@ class Page {
     this.#selected = robot;
     this.#trail = [];
     this.#mayTrail = 0;
-    this.#program = undefined;
+    this.#program = this.#countsAsked = this.#counts = undefined;
     this.#stale = true;
     this.#plots.select(robot);
     showProgram(undefined);
@@ -447,7 +518,6 @@ class Page {
       element("robot").hidden = true;
       return;
     }
-    this.#connection.send({ do: "robot", robot });
     if (!this.#playback.live) this.#askTrail();
     if (this.#run && this.#playback.current) showRobot(this.#run, this.#playback.current, robot, this.#counts);
   }
@@ -459,7 +529,6 @@ class Page {
     let nearest: number | undefined;
     let least = Math.max(this.#run.robotRadius, CLICK_REACH_PX / this.#camera.pxPerMm);
     for (let robot = 0; robot < frame.robots; ++robot) {
-      if (lifeOf(frame.state[robot]!) === LIFE_ABSENT) continue;
       const [a, b] = this.#placeOf(robot);
       const distance = Math.hypot(a - x, b - y);
       if (distance < least) [nearest, least] = [robot, distance];
@@ -628,6 +697,13 @@ class Page {
       },
     });
     window.addEventListener("keydown", (event) => this.#key(event));
+    // A new address of the same page brings a new token.
+    window.addEventListener("hashchange", () => this.#showToken());
+    this.#picture.addEventListener("webglcontextlost", (event) => {
+      event.preventDefault(); // else the browser does not give it back
+      notice("The browser has taken the graphics memory away. The picture comes back by itself.");
+    });
+    this.#picture.addEventListener("webglcontextrestored", () => this.#restorePicture());
   }
 
   #key(event: KeyboardEvent): void {

@@ -85,6 +85,26 @@ function partitionOf(run: Run, frame: Frame, robot: number): string | undefined 
   return `${cellOf(run, x, y).join(", ")}${isGhost(run, x, y) ? ", known to its neighbour" : ""}`;
 }
 
+/** Counts up to the time of the picture where events are recorded, else of the whole run. */
+function messageFacts(run: Run, counts: RobotCounts): Fact[] {
+  const facts: Fact[] = [];
+  const whole = counts.run;
+  const add = (name: string, now: string | undefined, ofRun: string | undefined): void => {
+    if (now !== undefined) facts.push([name, counts.whole ? now : `${now}…`]);
+    else if (ofRun !== undefined) facts.push([`${name}, whole run`, ofRun]);
+  };
+  const count = (value: number | undefined): string | undefined => (value === undefined ? undefined : String(value));
+  const partners = (value: { robot: number; count: number }[] | undefined): string | undefined => (value ? list(value) : undefined);
+  add("messages sent", run.sentRecorded ? count(counts.sent) : undefined, count(whole?.sent));
+  add("received", run.receivedRecorded ? count(counts.received) : undefined, count(whole?.received));
+  add("heard most", run.receivedRecorded ? partners(counts.heard) : undefined, partners(whole?.heard));
+  add("heard by", undefined, partners(whole?.heardBy));
+  add("lost to collisions", undefined, count(whole?.collided));
+  add("backed off", undefined, count(whole?.backedOff));
+  if (counts.since !== undefined && (run.sentRecorded || run.receivedRecorded)) facts.push(["messages since", seconds(counts.since * run.tickSeconds)]);
+  return facts;
+}
+
 export function showRobot(run: Run, frame: Frame, robot: number, counts: RobotCounts | undefined): void {
   const section = element("robot");
   section.hidden = false;
@@ -105,15 +125,7 @@ export function showRobot(run: Run, frame: Frame, robot: number, counts: RobotCo
   const partition = partitionOf(run, frame, robot);
   if (partition) facts.push(["partition", partition]);
   if (group) facts.push(["kind", group.kind], ["program", fileName(group.program) || "none"]);
-  if (counts?.robot === robot) {
-    const radio = counts.radio;
-    if (radio) {
-      facts.push(["messages sent", String(radio.sent)], ["received", String(radio.received)]);
-      facts.push(["lost to collisions", String(radio.collided)], ["backed off", String(radio.backedOff)]);
-    }
-    if (counts.heard) facts.push(["heard most", list(counts.heard)]);
-    if (counts.heardBy) facts.push(["heard by", list(counts.heardBy)]);
-  }
+  if (counts?.robot === robot) facts.push(...messageFacts(run, counts));
   setFacts(element("robot-facts"), facts);
 }
 

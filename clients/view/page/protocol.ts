@@ -76,9 +76,25 @@ export interface Floor {
 export interface RobotCounts {
   type: "robot";
   robot: number;
-  radio?: { attempted: number; sent: number; received: number; collided: number; backedOff: number };
+  tick: number;
+  /** false: not all was read; more, if it is asked for again. */
+  whole: boolean;
+  /** Of recorded events up to the tick; absent: they are not recorded. Counted from the tick `since`, if it is there. */
+  sent?: number;
+  received?: number;
   heard?: { robot: number; count: number }[];
-  heardBy?: { robot: number; count: number }[];
+  since?: number;
+  /** Robots that it has heard within the last seconds. */
+  lately?: number[];
+  /** Of the whole run. */
+  run?: {
+    sent?: number;
+    received?: number;
+    collided?: number;
+    backedOff?: number;
+    heard?: { robot: number; count: number }[];
+    heardBy?: { robot: number; count: number }[];
+  };
 }
 
 /** What can be plotted over time, of the swarm and of single robots. */
@@ -165,6 +181,15 @@ export interface MarksText {
   marks: { tick: number; text: string }[];
 }
 
+/** Where a robot was, oldest first, x and y in turn, mm; null: it was placed elsewhere in between. */
+export interface TrailText {
+  type: "trail";
+  robot: number;
+  /** false: there is more, if it is asked for again. */
+  whole: boolean;
+  xy: (number | null)[];
+}
+
 export type Message =
   | FlightsText
   | WorkText
@@ -178,9 +203,10 @@ export type Message =
   | RobotCounts
   | { type: "extent"; lastTick: number; states: number }
   | { type: "floors"; floors: Floor[] }
-  | { type: "trail"; robot: number; xy: number[] }
+  | TrailText
   | { type: "grant"; steer: boolean }
-  | { type: "notice"; text: string };
+  /** `refuses`: the request that the run refuses; empty: it refuses none. */
+  | { type: "notice"; text: string; refuses: "place" | "" };
 
 /** The state of all robots at one tick: views into the message's own memory. */
 export interface Frame {
@@ -234,6 +260,7 @@ export const ledOf = (headingLed: number): [number, number, number] => [
 ];
 
 export const LIFE_RUNNING = 4;
+/** A tracked robot that is lost, has left, or has not come yet. Its place is the last known one. */
 export const LIFE_ABSENT = 13;
 export const LIFE_FLAT = 14;
 export const LIFE_FAILED = 15;
@@ -249,7 +276,7 @@ const LIFE_NAMES: Record<number, string> = {
   4: "running",
   5: "charging",
   6: "moving",
-  [LIFE_ABSENT]: "absent",
+  [LIFE_ABSENT]: "not there, last seen here",
   [LIFE_FLAT]: "battery flat",
   [LIFE_FAILED]: "failed",
 };

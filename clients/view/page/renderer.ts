@@ -11,6 +11,7 @@ const LEAST_RADIUS_PX = 1.7;
 /** Vertices of a message: the strip along its arc. */
 const FLIGHT_VERTICES = 34;
 const GHOST_ALPHA = 30;
+const HEARD_ALPHA = 110;
 
 /** Colours of a theme, 0 to 255. */
 export interface Palette {
@@ -34,8 +35,11 @@ export interface Palette {
 /** What lies above the arena besides robots. */
 export interface Marks {
   selected: Point | undefined;
-  trail: Point[];
+  /** Where the selected robot was; parts, because it may have been placed elsewhere in between. */
+  trail: Point[][];
   range: number;
+  /** Robots that the selected one has heard lately. */
+  heard: Point[];
   /** Where tracked robots are with a probability of 95 %: rims. */
   ellipses: Point[][];
   /** Messages: FLOATS of flights.ts each. */
@@ -191,13 +195,15 @@ export class Renderer {
     this.#indexed = robots;
   }
 
-  /** Adds a segment to every robot's trail, and keeps the newest `keep`. */
-  addTrailSegment(from: Frame, to: Frame, keep: number): void {
+  /** Adds a segment to every robot's trail, and keeps the newest `keep`. Robots that moved further than `most`, mm, get none. */
+  addTrailSegment(from: Frame, to: Frame, keep: number, most: number): void {
     const n = Math.min(from.robots, to.robots);
     const ends = new Uint16Array(4 * n);
+    const longest = most / (this.#run?.gridStep ?? 1);
     for (let i = 0; i < n; ++i) {
-      ends[4 * i] = from.x[i]!;
-      ends[4 * i + 1] = from.y[i]!;
+      const near = Math.hypot(to.x[i]! - from.x[i]!, to.y[i]! - from.y[i]!) <= longest;
+      ends[4 * i] = near ? from.x[i]! : to.x[i]!;
+      ends[4 * i + 1] = near ? from.y[i]! : to.y[i]!;
       ends[4 * i + 2] = to.x[i]!;
       ends[4 * i + 3] = to.y[i]!;
     }
@@ -336,7 +342,9 @@ export class Renderer {
       this.#above.line(...arm, 1.5 * px, palette.accent);
       this.#above.convex(handle, palette.accent);
     }
-    this.#above.path(marks.trail, 2 * px, palette.accent);
+    const faint: Colour = [palette.message[0], palette.message[1], palette.message[2], HEARD_ALPHA];
+    if (marks.selected) for (const from of marks.heard) this.#above.line(from, marks.selected, 1.5 * px, faint);
+    for (const part of marks.trail) this.#above.path(part, 2 * px, palette.accent);
     if (!marks.selected) return;
     this.#above.path(circle(...marks.selected, radius + 4 * px, 48), 2.5 * px, palette.accent, true);
     if (marks.range <= 0) return;

@@ -48,12 +48,11 @@ void main() {
   v_ghost = (u_cells.x > 1.5 && away.x <= u_margin) || (u_cells.y > 1.5 && away.y <= u_margin) ? 1.0 : 0.0;
   int life = int(a_stateKind.x) & 15;
   v_lifeKind = vec2(float(life), a_stateKind.y);
-  if (life == 13) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);  // absent: outside the picture
 }`;
 
 // Disc in the LED's colour with a rim, a bar towards the heading, and a mark by state and kind: a cross for failed robots, a
 // minus for flat batteries, a square around tracked ones, a square inside firmware ones, a dotted ring around those that several
-// partitions know.
+// partitions know. Of tracked robots that are not there, a dashed ring at their last place.
 export const ROBOT_FRAGMENT = `#version 300 es
 precision highp float;
 in vec2 v_at;
@@ -67,6 +66,13 @@ float inside(float distance) { return clamp(0.5 - distance * u_pxPerRadius, 0.0,
 void main() {
   float life = v_lifeKind.x, kind = v_lifeKind.y;
   float r = length(v_at);
+  if (life > 12.5 && life < 13.5) {
+    float dashes = step(0.4, fract(atan(v_at.y, v_at.x) * 1.2732395));  // eight of them
+    float lost = inside(abs(r - 1.1) - 0.13) * dashes;
+    if (lost <= 0.0) discard;
+    colour = vec4(u_tracked * lost, lost);
+    return;
+  }
   float disc = inside(r - 1.0);
   bool lit = v_led.r + v_led.g + v_led.b > 0.0;
   vec3 paint = lit ? 0.25 + 0.75 * v_led : u_body;

@@ -89,15 +89,23 @@ export function svgOf(scene: Scene, camera: Camera, palette: Palette): string {
       below.add(`${fill(palette.movable)} stroke="${css(palette.movableRim)}" stroke-width="2"`, path(rim, true));
     });
   }
+  const words: string[] = [];
+  const word = (text: string, [x, y]: Point, colour: Colour): void => {
+    words.push(`<text x="${n(x)}" y="${n(y)}" ${fill(colour)}>${escaped(text)}</text>`);
+  };
   const robots = new Paths();
   const r = Math.max(run.robotRadius * scale, 1.7);
   const rim = `stroke="${css(palette.ink)}" stroke-width="${n(Math.max(0.5, 0.14 * r))}"`;
   for (let robot = 0; robot < frame.robots; ++robot) {
     const life = lifeOf(frame.state[robot]!);
-    if (life === LIFE_ABSENT) continue;
     const place = at(scene.placeOf(robot));
     const [x, y] = place;
     if (x < -r || y < -r || x > camera.width + r || y > camera.height + r) continue;
+    if (life === LIFE_ABSENT) {
+      above.add(line(palette.tracked, 0.26 * r, ` stroke-dasharray="${n(0.52 * r)} ${n(0.35 * r)}"`), disc(place, 1.1 * r));
+      word("?", [x, y + 4], palette.ink);
+      continue;
+    }
     robots.add(`fill="${paint(frame.headingLed[robot]!, palette)}" ${rim}`, disc(place, 0.93 * r));
     const heading = headingOf(frame.headingLed[robot]!);
     above.add(line(palette.ink, 0.22 * r), path([place, [x + 0.9 * r * Math.cos(heading), y - 0.9 * r * Math.sin(heading)]], false));
@@ -120,12 +128,9 @@ export function svgOf(scene: Scene, camera: Camera, palette: Palette): string {
     if (fromX === toX && fromY === toY) above.add(colour, disc(a, r * (1.15 + 1.2 * age)));
     else above.add(colour, `M${n(a[0])} ${n(a[1])}Q${n(bend[0])} ${n(bend[1])} ${n(b[0])} ${n(b[1])}`);
   }
+  if (marks.selected) for (const from of marks.heard) above.add(`${line(palette.message, 1.5)} stroke-opacity="0.4"`, path([at(from), at(marks.selected)], false));
   for (const rimOf of marks.ellipses) above.add(line(palette.tracked, 1.5), path(rimOf.map(at), true));
-  if (marks.trail.length > 1) above.add(line(palette.accent, 2), path(marks.trail.map(at), false));
-  const words: string[] = [];
-  const word = (text: string, [x, y]: Point, colour: Colour): void => {
-    words.push(`<text x="${n(x)}" y="${n(y)}" ${fill(colour)}>${escaped(text)}</text>`);
-  };
+  for (const part of marks.trail.filter(({ length }) => length > 1)) above.add(line(palette.accent, 2), path(part.map(at), false));
   for (const spot of run.circles) word(spot.name, at([spot.x, spot.y + spot.radius]), palette.ink);
   if (marks.selected) {
     const place = at(marks.selected);

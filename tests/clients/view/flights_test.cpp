@@ -64,5 +64,25 @@ TEST(LiveFlights, TellTheNewestOfATimeAndForgetOldOnes) {
   EXPECT_EQ(json::parse(live.text(30, 31)), one);
 }
 
+TEST(LiveFlights, TellWhatARobotHasSentAndWhomItHasHeard) {
+  LiveFlights live;
+  proto::Observations observed;
+  *observed.add_event() = event_of(proto::RECEIVED, 10, 3, 8);
+  *observed.add_event() = event_of(proto::RECEIVED, 90, 3, 9);
+  *observed.add_event() = event_of(proto::RECEIVED, 91, 3, 9);
+  *observed.add_event() = event_of(proto::RECEIVED, 91, 4, 3);
+  *observed.add_event() = event_of(proto::SENT, 91, 3, 0);
+  const std::string octets = observed.SerializeAsString();
+  live.take(octets.data(), octets.size(), 100, kLength);
+  const json robot = json::parse(live.robot_text(3, 99, 20));
+  EXPECT_EQ(robot["sent"], 1);
+  EXPECT_EQ(robot["received"], 3);
+  EXPECT_EQ(robot["heard"][0]["robot"], 9);
+  EXPECT_EQ(robot["heard"][0]["count"], 2);
+  EXPECT_EQ(robot["lately"].size(), 1u);
+  EXPECT_EQ(robot["lately"][0], 9);
+  EXPECT_EQ(robot["since"], 10);
+}
+
 }  // namespace
 }  // namespace kilotwin::view

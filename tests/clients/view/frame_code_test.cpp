@@ -81,20 +81,34 @@ TEST(ViewRequest, ReadsEveryKind) {
   EXPECT_EQ(seek->tick, 12345678901);
   EXPECT_EQ(seek->number, 7u);
   EXPECT_EQ(parse_request(R"({"do":"trail","robot":3,"tick":0})")->robot, 3u);
-  EXPECT_EQ(parse_request(R"({"do":"robot","robot":4294967295})")->robot, 4294967295u);
+  EXPECT_EQ(parse_request(R"({"do":"robot","robot":4294967295,"tick":0})")->robot, 4294967295u);
   EXPECT_EQ(parse_request(R"({"do":"step","steps":20})")->steps, 20u);
   for (const char* word : {"pause", "continue", "stop"})
     EXPECT_TRUE(parse_request(std::string(R"({"do":")") + word + "\"}")->steers());
 }
 
 TEST(ViewRequest, RefusesWhatIsNone) {
-  for (const char* text :
-       {"", "[]", "7", "{", "{}", R"({"do":7})", R"({"do":"dance"})", R"({"do":"hello"})",
-        R"({"do":"hello","token":1})", R"({"do":"at","tick":-1,"request":1})",
-        R"({"do":"at","tick":1.5,"request":1})", R"({"do":"at","tick":1})",
-        R"({"do":"at","tick":18446744073709551615,"request":1})", R"({"do":"at","tick":1,"request":0})",
-        R"({"do":"robot","robot":4294967296})", R"({"do":"robot","robot":-1})", R"({"do":"step","steps":0})",
-        R"({"do":"step","steps":1000001})", R"({"do":"step"})"})
+  for (const char* text : {"",
+                           "[]",
+                           "7",
+                           "{",
+                           "{}",
+                           R"({"do":7})",
+                           R"({"do":"dance"})",
+                           R"({"do":"hello"})",
+                           R"({"do":"hello","token":1})",
+                           R"({"do":"at","tick":-1,"request":1})",
+                           R"({"do":"at","tick":1.5,"request":1})",
+                           R"({"do":"at","tick":1})",
+                           R"({"do":"at","tick":18446744073709551615,"request":1})",
+                           R"({"do":"at","tick":1,"request":0})",
+                           R"({"do":"robot","robot":4294967296,"tick":0})",
+                           R"({"do":"robot","robot":-1,"tick":0})",
+                           R"({"do":"robot","robot":1})",
+                           R"({"do":"floors"})",
+                           R"({"do":"step","steps":0})",
+                           R"({"do":"step","steps":1000001})",
+                           R"({"do":"step"})"})
     EXPECT_FALSE(parse_request(text)) << text;
   EXPECT_FALSE(parse_request(R"({"do":"hello","token":")" + std::string(kLongestRequest_bytes, 'a') + "\"}"));
   EXPECT_FALSE(parse_request(std::string(kLongestRequest_bytes, '[')));

@@ -3,11 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
 #include <cstring>
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <random>
+#include <thread>
 #include <vector>
 
 #include "clients/view/recorded_run.hpp"
@@ -33,11 +36,24 @@ class NotedRun : public RecordedRun {
     if (request.kind == Request::Kind::kOverhead) packets.push_back(request.packet);
     if (request.kind == Request::Kind::kPlace) places.push_back(request.place);
     steered.push_back(request.kind);
-    return request.kind == Request::Kind::kStop ? "not now" : "";
+    const bool refused = request.kind == Request::Kind::kStop || request.place.body == 19;
+    return refused ? "not now" : "";
   }
   std::vector<OverheadPacket> packets;
   std::vector<Relocation> places;
   std::vector<Request::Kind> steered;  // of the gateway's thread; read it after an answer
+};
+
+/// A recording whose plots take long.
+class SlowRun : public NotedRun {
+ public:
+  using NotedRun::NotedRun;
+  [[nodiscard]] std::string plot(std::uint32_t number, std::optional<std::uint32_t> robot) override {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    ++plots_answered;
+    return NotedRun::plot(number, robot);
+  }
+  std::atomic<int> plots_answered{0};
 };
 
 class GatewayTest : public testing::Test {
@@ -112,7 +128,7 @@ TEST_F(GatewayTest, AnswersWithTheStateAtATick) {
   const auto frame = viewer.await("frame");
   ASSERT_TRUE(frame);
   EXPECT_EQ(frame->payload, run_->frame_at(100, 5));
-  viewer.send_text(R"({"do":"robot","robot":1})");
+  viewer.send_text(R"({"do":"robot","robot":1,"tick":100})");
   EXPECT_TRUE(viewer.await("robot"));
   viewer.send_text(R"({"do":"trail","robot":1,"tick":100})");
   EXPECT_TRUE(viewer.await("trail"));
@@ -160,9 +176,12 @@ TEST_F(GatewayTest, OnlyTheTokenAllowsToSteer) {
   const auto refusal = viewer.await("notice");
   ASSERT_TRUE(refusal);
   EXPECT_NE(refusal->payload.find("not now"), std::string::npos);
+  EXPECT_EQ(json::parse(refusal->payload)["refuses"], "");
+  viewer.send_text(R"({"do":"place","robot":19,"x":0,"y":0,"heading":0})");
+  EXPECT_EQ(json::parse(viewer.await("notice")->payload)["refuses"], "place");
   EXPECT_EQ(run_->steered, (std::vector{Request::Kind::kPause, Request::Kind::kOverhead, Request::Kind::kPlace,
-                                        Request::Kind::kPlace, Request::Kind::kStop}));
-  ASSERT_EQ(run_->places.size(), 2u);
+                                        Request::Kind::kPlace, Request::Kind::kStop, Request::Kind::kPlace}));
+  ASSERT_EQ(run_->places.size(), 3u);
   EXPECT_EQ(run_->places[0].body, 3u);
   EXPECT_EQ(run_->places[0].pose.x_mm, -12.5);
   EXPECT_NEAR(run_->places[0].pose.heading_rad, 7 - 2 * kPi, 1e-12);
@@ -256,6 +275,47 @@ TEST_F(GatewayTest, AStalledViewerDelaysNobodyAndIsSentNoMore) {
   }
   // It asked 400 times without reading: at most what fits into the sockets was sent to it.
   EXPECT_LT(gateway_->traffic().bytes, 200 * large.size() + 40 * large.size());
+}
+
+TEST_F(GatewayTest, WhoAsksExpensiveQuestionsWaitsForTheOthers) {
+  SlowRun slow(scratch_ / "r.ktrec");
+  gateway_->show(slow, slow.text());
+  constexpr int kGreedy = 12, kRounds = 20;
+  std::vector<std::unique_ptr<WebSocketClient>> greedy;
+  const auto ask_much = [&greedy] {
+    for (const auto& viewer : greedy)
+      for (int i = 0; i < 8; ++i) viewer->send_text(R"({"do":"plot","plot":0})");
+  };
+  for (int i = 0; i < kGreedy; ++i) greedy.push_back(std::make_unique<WebSocketClient>(port()));
+  WebSocketClient viewer(port());
+  ASSERT_TRUE(viewer.await("run"));
+  ask_much();
+  ASSERT_TRUE(test::eventually([&] { return slow.plots_answered > kGreedy; }));
+  const int before = slow.plots_answered;
+  for (int i = 0; i < kRounds; ++i) {
+    if (i % 4 == 3) ask_much();
+    viewer.send_text(R"({"do":"robot","robot":1,"tick":100})");
+    ASSERT_TRUE(viewer.await("robot"));
+  }
+  EXPECT_LE(slow.plots_answered - before, 3 * kRounds) << "not one of each greedy viewer per answer";
+  // Nobody starves: all greedy ones get their answers.
+  for (const auto& one : greedy) EXPECT_TRUE(one->await("plot"));
+  gateway_.reset();  // before the run that answers
+}
+
+TEST_F(GatewayTest, AViewerThatDoesNotReadItsAnswersHoldsUpNobody) {
+  WebSocketClient stalled(port()), viewer(port());
+  ASSERT_TRUE(viewer.await("run"));
+  ASSERT_TRUE(stalled.await("run"));
+  // Long answers that it never reads, until the sockets are full: then it waits with answers that took least time.
+  for (int i = 0; i < 400; ++i) {
+    stalled.send_text(R"({"do":"flights","from":-1,"tick":100000})");
+    stalled.send_text(R"({"do":"trail","robot":1,"tick":100000})");
+    if (i % 100 == 99) {
+      viewer.send_text(R"({"do":"robot","robot":1,"tick":100})");
+      ASSERT_TRUE(viewer.await("robot")) << i;
+    }
+  }
 }
 
 TEST_F(GatewayTest, TellsAllViewersOfTheNextRun) {

@@ -7,7 +7,7 @@ import fs from "node:fs";
 import path from "node:path";
 import { eventually } from "./browser.mjs";
 import {
-  clock, counter, kilotwin, newContext, onScreen, open, phase, picture, poseOfSelected, press, run, saved, scratch, select, serve, text,
+  clock, counter, kilotwin, newContext, onScreen, open, phase, picture, poseOfSelected, press, run, saved, scratch, select, serve, tell, text,
 } from "./page_tools.mjs";
 
 const TICK_S = 0.032768;
@@ -78,6 +78,8 @@ async function movesAndHandOvers() {
   assert.match(await text(page, "federates"), /physics 0,0computes \d+, exchanges \d+, waits \d+ %/);
   await eventually("nobody holds up a run at its pace", async () => (await text(page, "work-verdict")).startsWith("Nobody holds up"));
   await select(page, 7);
+  await eventually("its messages", async () => /messages sent[1-9]\d*…?received[1-9]\d*…?heard most\d+ \(/.test(await text(page, "robot-facts")));
+  await eventually("lines from robots that it heard", async () => (await saved(page, "Save the picture as SVG")).toString().includes('stroke-opacity="0.4"'));
   await picture(page, "messages");
 
   // A viewer without the token moves nothing.
@@ -99,6 +101,11 @@ async function movesAndHandOvers() {
   await eventually("the reason", async () => (await text(page, "notice")).includes("Robot 7 stands there after the next step"));
   assert.deepEqual(await poseOfSelected(page), before);
   await picture(page, "moving");
+  // A notice of something else does not take the move back.
+  await tell(page, { type: "notice", text: "something else", refuses: "" });
+  assert.equal(await text(page, "notice"), "something else");
+  await tell(page, { type: "marks", whole: true, marks: [] }); // the page draws after each message
+  assert.equal(await held(page), "robot 7 waits");
   await page.keyboard.press(".");
   await eventually("the step", async () => (await tickOf(page)) === tick + 1);
   await eventually("the outline has arrived", async () => (await held(page)) === "robot 7");
@@ -143,14 +150,22 @@ async function movesAndHandOvers() {
   // Without the tool a drag moves the picture; with shift it moves a robot.
   await drag(page, await onScreen(page, there[0] + 5, there[1]), await onScreen(page, 500, 200), true);
   await eventually("moved with shift", async () => (await held(page)) === "robot 7" && Math.abs((await poseOfSelected(page))[1] - 200) < 8);
+  // Its trail goes on from there: no line leads across the arena. Robots stand, so each part is one place.
+  const trail = async () => (await saved(page, "Save the picture as SVG")).toString().match(/stroke-width="2" d="(M[^"Z]*)"/)?.[1];
+  const standing = await tickOf(page);
+  await eventually("a trail", async () => (await tickOf(page)) > standing + 100 && (await trail()) !== undefined);
+  for (const part of (await trail()).split("M").filter(Boolean)) {
+    const places = part.split("L").map((place) => place.split(" ").map(Number));
+    near(Math.max(...places.map(([a]) => a)), Math.min(...places.map(([a]) => a)), 5, "width of a part of the trail");
+  }
   assert.deepEqual(page.faults, []);
 
   // The recording has a mark for each, and replays them to the same hash.
   page.once("dialog", (dialog) => dialog.accept());
   await press(page, "Stop the run for good");
   await phase(page, "recorded");
-  await eventually("marks", async () => (await page.locator("#marks span").count()) === 5);
-  const titles = await page.locator("#marks span").evaluateAll((marks) => marks.map((mark) => mark.title));
+  await eventually("marks", async () => (await page.locator("#marks button").count()) === 5);
+  const titles = await page.locator("#marks button").evaluateAll((marks) => marks.map((mark) => mark.title));
   assert.match(titles.join("\n"), /object 0 placed at 20\d, 60\d mm/);
   await eventually("the whole run's times", async () => (await text(page, "work-span")) === "whole run");
   assert.deepEqual(page.faults, []);
@@ -235,6 +250,19 @@ async function hybridRun() {
   } finally {
     player.kill("SIGTERM");
   }
+  // Without its tracker, every robot is lost: a dashed ring with a question mark at its last place.
+  const lost = async () => [...(await saved(page, "Save the picture as SVG")).toString().matchAll(/<text x="(-?[\d.]+)" y="(-?[\d.]+)"[^>]*>\?</g)];
+  await eventually("four question marks", async () => (await lost()).length === 4);
+  await eventually("its state", async () => (await text(page, "robot-facts")).includes("statenot there, last seen here"));
+  await page.keyboard.press("0");
+  const view = await page.locator("#picture").boundingBox();
+  const [lastX, lastY] = await onScreen(page, ...(await poseOfSelected(page)));
+  assert.ok((await lost()).some(([, x, y]) => Math.hypot(Number(x) + view.x - lastX, Number(y) - 4 + view.y - lastY) < 2), "robot 1 is marked where it was");
+  // A click selects it.
+  await page.keyboard.press("Escape");
+  await page.mouse.click(lastX, lastY);
+  await eventually("robot 1", async () => (await text(page, "robot-title")) === "Robot 1");
+  await picture(page, "lost");
   assert.deepEqual(page.faults, []);
   page.once("dialog", (dialog) => dialog.accept());
   await press(page, "Stop the run for good");

@@ -51,7 +51,13 @@ async function recordedRun() {
     await eventually(`robot ${robot}`, async () => (await text(page, "robot-title")) === `Robot ${robot}`);
   };
   await click(700);
-  await eventually("its counters", async () => (await text(page, "robot-facts")).includes("messages sent703"));
+  // Counts up to now where events are recorded, else of the whole run. A line leads from the robot that it has heard.
+  const statesSoFar = Math.floor((at + 0.001) / 0.5);
+  await eventually("its counters", async () => (await text(page, "robot-facts")).includes(`messages sent, whole run703received${statesSoFar}heard most701 (${statesSoFar})`));
+  const heard = /stroke-opacity="0.4" d="M(-?[\d.]+) (-?[\d.]+)L(-?[\d.]+) (-?[\d.]+)"/.exec((await saved(page, "Save the picture as SVG")).toString());
+  const [heardX, heardY] = await onScreen(page, ...circling(701, at));
+  const arena = await page.locator("#picture").boundingBox();
+  assert.ok(Math.hypot(Number(heard[1]) + arena.x - heardX, Number(heard[2]) + arena.y - heardY) < 1);
   await picture(page, "recorded");
 
   // Messages fly between robots of the recording, a bounded number in a picture; the button hides them.
@@ -70,16 +76,35 @@ async function recordedRun() {
   await eventually("messages again", async () => (await messagesDrawn()) > 0);
 
   // A mark of the time line leads to the tick at which a robot was placed.
-  await eventually("a mark", async () => (await page.locator("#marks span").count()) === 1);
-  assert.match(await page.locator("#marks span").getAttribute("title"), /robot 4 placed at 120, -80 mm, heading 90/);
+  const mark = page.getByRole("button", { name: /Go to .* robot 4 placed at 120, -80 mm, heading 90/ });
+  await eventually("a mark", async () => (await mark.count()) === 1);
   const stood = await clock(page);
-  await page.locator("#marks span").click();
+  await mark.focus();
+  await page.keyboard.press("Enter");
   await eventually("the mark's time", async () => Math.abs((await clock(page)) - 50) < 0.6);
   await page.locator("#line").fill(String(Math.round(stood / 0.032768)));
   await eventually("back", async () => Math.abs((await clock(page)) - stood) < 0.001);
   // Nothing moves in a recording, and the page says so.
   await page.keyboard.press("g");
   await eventually("the reason", async () => (await text(page, "notice")).includes("Moving needs a run that goes on"));
+
+  // The browser may take the graphics memory away; the same picture comes back.
+  const looks = () => saved(page, "Save the picture as PNG");
+  let pictured = Buffer.alloc(0);
+  await eventually("a picture that stays", async () => {
+    const before = pictured;
+    await page.waitForTimeout(600); // longer than the page waits before it asks again
+    return (pictured = await looks()).equals(before);
+  });
+  const lose = (restore) => page.evaluate((back) => {
+    window.lost ??= document.getElementById("picture").getContext("webgl2").getExtension("WEBGL_lose_context");
+    if (back) window.lost.restoreContext();
+    else window.lost.loseContext();
+  }, restore);
+  await lose(false);
+  await eventually("the reason", async () => (await text(page, "notice")).includes("graphics memory"));
+  await lose(true);
+  await eventually("the same picture", async () => (await looks()).equals(pictured));
 
   // Dragging moves the picture with the pointer: the robot is now 120 px further right and 40 px lower.
   const box = await page.locator("#picture").boundingBox();
@@ -228,6 +253,13 @@ async function liveRun() {
   await phase(page, "live: running");
   await eventually("states", async () => (await received(page)) > 5);
   assert.equal(await text(page, "count"), "100");
+
+  // The token leaves the address. The tab remembers it when it is loaded again.
+  assert.ok(!page.url().includes("token"), page.url());
+  await page.reload();
+  await connected(page);
+  await phase(page, "live: running");
+  await eventually("it may steer", () => page.locator("#play").isEnabled());
 
   // Without the token nothing steers.
   const stranger = await (await newContext()).newPage();

@@ -35,10 +35,21 @@ export async function open(address, context = browser) {
   page.on("request", (request) => {
     if (new URL(request.url()).host !== new URL(address).host && !request.url().startsWith("blob:")) page.faults.push(request.url());
   });
+  await page.addInitScript(() => {
+    const Socket = window.WebSocket;
+    window.WebSocket = class extends Socket {
+      constructor(...words) {
+        super(...words);
+        window.lastSocket = this;
+      }
+    };
+  });
   await page.goto(address);
   await connected(page);
   return page;
 }
+/** The page takes a message as if the gateway had sent it. */
+export const tell = (page, message) => page.evaluate((data) => window.lastSocket.onmessage({ data }), JSON.stringify(message));
 export const newContext = () => browser.newContext();
 export const text = (page, id) => page.locator(`#${id}`).textContent();
 export const connected = (page) => eventually("connected", async () => (await page.locator("body").getAttribute("data-connection")) === "open");

@@ -7,7 +7,9 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "clients/recorder/observables.hpp"
 #include "clients/view/flights.hpp"
@@ -137,15 +139,15 @@ TEST(RecordedRun, TellsOfRobotsAndTheirTrails) {
   Scratch scratch;
   test::write_circling(scratch / "r.ktrec", {.robots = 20, .states = 2000, .every_s = 0.1});
   RecordedRun run(scratch / "r.ktrec");
-  const json robot = json::parse(run.robot(1));
-  EXPECT_EQ(robot["radio"]["attempted"], 6);
+  const json robot = json::parse(run.robot(1, 1000))["run"];
+  EXPECT_EQ(robot["attempted"], 6);
   EXPECT_EQ(robot["heard"][0]["robot"], 0);
   EXPECT_EQ(robot["heard"][0]["count"], 9);
   EXPECT_EQ(robot["heard"].size(), 2u);
   EXPECT_EQ(robot["heardBy"][0]["robot"], 0);
-  EXPECT_EQ(json::parse(run.robot(20))["type"], "notice");
+  EXPECT_EQ(json::parse(run.robot(20, 0))["type"], "notice");
   const json trail = json::parse(run.trail(3, 1000));
-  EXPECT_LE(trail["xy"].size(), 800u);
+  EXPECT_LE(trail["xy"].size(), 2 * kMostPoints + 2);
   EXPECT_GT(trail["xy"].size(), 200u);
   const Pose end = test::circling_pose(3, 20, 1000 * 0.032768);
   EXPECT_NEAR(trail["xy"][trail["xy"].size() - 2].get<double>(), end.x_mm, 1);
@@ -338,6 +340,70 @@ TEST(RecordedRun, TellsWhichMessagesFly) {
   const json bounded = json::parse(many.flights(-1, 1000));
   EXPECT_EQ(bounded["tick"].size(), kMostFlights);
   EXPECT_EQ(bounded["whole"], false);
+}
+
+TEST(RecordedRun, ShowsWhatWasSentWhereMuchIsReceived) {
+  Scratch scratch;
+  test::write_circling(scratch / "r.ktrec",
+                       {.robots = 6000, .states = 400, .every_s = 0.05, .flights = true, .inside = true});
+  RecordedRun run(scratch / "r.ktrec");
+  const json flights = json::parse(run.flights(-1, 400));
+  EXPECT_EQ(flights["tick"].size(), kMostFlights);
+  EXPECT_EQ(flights["whole"], false);
+  std::size_t sent = 0;
+  for (std::size_t i = 0; i < flights["tick"].size(); ++i) sent += flights["sender"][i] == flights["receiver"][i];
+  EXPECT_EQ(sent, kMostFlights / 2);
+}
+
+TEST(RecordedRun, CountsMessagesUpToTheTick) {
+  Scratch scratch;
+  test::write_circling(scratch / "r.ktrec", {.robots = 40, .states = 60, .flights = true, .inside = true});
+  RecordedRun run(scratch / "r.ktrec");
+  // Before each state but the first, robot 10 receives a message of robot 11, and robot 11 sends at each state.
+  const recorder::RecordingSchedule schedule(TickLength{262144}, 0.5);
+  for (const int number : {0, 1, 30, 59, 12}) {
+    const std::int64_t tick = schedule.tick(number).count();
+    const json receiver = json::parse(run.robot(10, tick)), sender = json::parse(run.robot(11, tick));
+    EXPECT_EQ(receiver["whole"], true);
+    EXPECT_EQ(receiver["received"], number);
+    EXPECT_EQ(receiver["sent"], 0);
+    EXPECT_EQ(receiver["heard"].empty(), number == 0);
+    EXPECT_EQ(receiver["lately"], number == 0 ? json::array() : json{11});
+    EXPECT_EQ(sender["sent"], number + 1);
+    EXPECT_EQ(sender["received"], 0);
+    if (number > 0) {
+      EXPECT_EQ(receiver["heard"][0]["count"], number);
+    }
+  }
+}
+
+TEST(RecordedRun, ATrailIsCutWhereTheRobotWasPlacedElsewhere) {
+  Scratch scratch;
+  test::write_circling(scratch / "r.ktrec", {.robots = 20, .states = 120, .jumps = true});
+  RecordedRun run(scratch / "r.ktrec");
+  const auto cuts = [&run](std::uint32_t robot, std::int64_t tick) {
+    const json trail = json::parse(run.trail(robot, tick));
+    EXPECT_EQ(trail["whole"], true);
+    return std::count(trail["xy"].begin(), trail["xy"].end(), json(nullptr));
+  };
+  EXPECT_EQ(cuts(3, 100000), 0);
+  EXPECT_EQ(cuts(4, 100000), 2) << "x and y";
+  EXPECT_EQ(cuts(4, 500), 0) << "before it";
+}
+
+TEST(RecordedCurves, TwoViewersOfDifferentRobotsBothGetTheirCurves) {
+  Scratch scratch;
+  // So large that one answer does not suffice: 18 states of 2.6 MB each.
+  test::write_circling(scratch / "r.ktrec", {.robots = 100000, .states = 18});
+  RecordedRun run(scratch / "r.ktrec");
+  const std::uint32_t msd = number_of(run, "displacement");
+  std::map<std::uint32_t, int> answers;
+  for (std::set<std::uint32_t> waiting{1, 2, 3}; !waiting.empty();) {
+    for (const std::uint32_t robot : std::set(waiting)) {
+      ASSERT_LE(++answers[robot], 18) << "an answer reads a state at least";
+      if (json::parse(run.plot(msd, robot))["whole"].get<bool>()) waiting.erase(robot);
+    }
+  }
 }
 
 TEST(RecordedRun, MarksWhatWasPlacedElsewhere) {

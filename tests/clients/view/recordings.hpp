@@ -21,6 +21,7 @@ struct Circling {
   bool outside = false;  ///< a tracker sees robots 0 to 9, and every tenth state a packet comes from outside
   bool flights = false;  ///< before each state but the first, every tenth robot receives a message of its successor
   bool placed = false;   ///< robot 4 is placed at 120, -80 mm, heading 90 degrees, 50 s after the start
+  bool jumps = false;    ///< robot 4 is 700 mm further right than it would be, 30 s after the start and later
   bool inside = false;   ///< variables "count", of two hosts, and "part" of every second robot; events SENT
   bool observables = false;  ///< "far" of poses, and "most" of the variable "count" and of the displacement
 };
@@ -175,7 +176,7 @@ inline void write_circling(const std::filesystem::path& file, const Circling& pl
     const Tick tick = schedule.tick(number);
     for (std::uint32_t i = 0; i < plan.robots; ++i) {
       const Pose pose = circling_pose(i, plan.robots, length.seconds_at(tick));
-      x[i] = pose.x_mm;
+      x[i] = pose.x_mm + (plan.jumps && i == 4 && length.seconds_at(tick) >= 30 ? 700 : 0);
       y[i] = pose.y_mm;
       heading[i] = pose.heading_rad;
       led[i] = static_cast<std::uint8_t>((i + static_cast<std::uint32_t>(number) / 8) % 64);
