@@ -24,11 +24,12 @@ class Table(Mapping[str, np.ndarray]):
         self._arrays: Any = np.load(file)
         self._read: dict[str, np.ndarray] = {}
         with zipfile.ZipFile(file) as archive:
+            columns = [json.loads(member.comment) for member in archive.infolist()]
             about = json.loads(archive.comment)
         #: Unit of each column: "mm", "s", "rad"; empty for pure numbers and texts.
-        self.units: dict[str, str] = {column["name"]: column["unit"] for column in about.pop("columns")}
+        self.units: dict[str, str] = {column["name"]: column["unit"] for column in columns}
         #: Where the table comes from: experiment, seed, run, state_hash, version, build, date.
-        self.about: dict[str, str] = about
+        self.about: dict[str, str] = {name: text for name, text in about.items() if name != "columns"}
 
     def __getitem__(self, column: str) -> np.ndarray:
         if column not in self._read:
