@@ -197,6 +197,7 @@ class Package(unittest.TestCase):
             # A value that one robot refuses changes no robot.
             with self.assertRaisesRegex(kilotwin.KilotwinError, "robot 4: gain cannot hold 256"):
                 arena.set_variable("gain", [1, 2, 3, 4, 256])
+            arena.step(1)
             np.testing.assert_array_equal(arena.variable("gain"), [10, 11, 12, 7, 255])
             with self.assertRaisesRegex(KeyError, "there are: gain"):
                 arena.variable("gains")

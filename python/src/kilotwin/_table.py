@@ -24,12 +24,13 @@ class Table(Mapping[str, np.ndarray]):
         self._arrays: Any = np.load(file)
         self._read: dict[str, np.ndarray] = {}
         with zipfile.ZipFile(file) as archive:
-            columns = [json.loads(member.comment) for member in archive.infolist()]
             about = json.loads(archive.comment)
+            # With very many columns, only the arrays' own comments describe them.
+            columns = about.pop("columns") or [json.loads(member.comment) for member in archive.infolist()]
         #: Unit of each column: "mm", "s", "rad"; empty for pure numbers and texts.
         self.units: dict[str, str] = {column["name"]: column["unit"] for column in columns}
         #: Where the table comes from: experiment, seed, run, state_hash, version, build, date.
-        self.about: dict[str, str] = {name: text for name, text in about.items() if name != "columns"}
+        self.about: dict[str, str] = about
 
     def __getitem__(self, column: str) -> np.ndarray:
         if column not in self._read:
