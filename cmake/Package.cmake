@@ -8,14 +8,15 @@ if(NOT epoch)
 endif()
 set(folder ${PROJECT_BINARY_DIR}/package)
 
-# Manual pages of all commands, by their --help.
+# Manual pages of all commands, by their --help. Some commands are programs of their own, which must be there.
+get_property(helpers GLOBAL PROPERTY kilotwin_helpers)
 add_custom_command(
   OUTPUT ${folder}/manual.stamp
   COMMAND ${CMAKE_COMMAND} -E rm -rf ${folder}/man
   COMMAND ${PROJECT_SOURCE_DIR}/deploy/package/manual $<TARGET_FILE:kilotwin> ${folder}/man
   COMMAND sh -c "${GZIP} -n9 ${folder}/man/*.1"
   COMMAND ${CMAKE_COMMAND} -E touch ${folder}/manual.stamp
-  DEPENDS kilotwin kilotwin-identify kilotwin-vision kilotwin-view ${PROJECT_SOURCE_DIR}/deploy/package/manual
+  DEPENDS kilotwin ${helpers} ${PROJECT_SOURCE_DIR}/deploy/package/manual
   VERBATIM)
 add_custom_target(manual ALL DEPENDS ${folder}/manual.stamp)
 install(DIRECTORY ${folder}/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
@@ -34,6 +35,9 @@ file(WRITE ${folder}/copyright
   "Files: *\nCopyright: 2026 the Kilotwin authors\nLicense: Expat\n\nLicense: Expat\n${license}")
 install(FILES ${folder}/changelog.gz ${folder}/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/kilotwin)
 install(FILES deploy/package/lintian-overrides RENAME kilotwin DESTINATION ${CMAKE_INSTALL_DATADIR}/lintian/overrides)
+# The Python package is pure, for Debian's Python.
+install(DIRECTORY python/src/kilotwin DESTINATION lib/python3/dist-packages
+  FILES_MATCHING PATTERN "*.py" PATTERN "py.typed" PATTERN "__pycache__" EXCLUDE)
 install(FILES deploy/package/kilotwin.bash RENAME kilotwin DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
 
 set(CPACK_PACKAGE_NAME kilotwin)
@@ -49,7 +53,7 @@ set(CPACK_DEBIAN_PACKAGE_PRIORITY optional)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 # A run compiles the programs of robots.
 set(CPACK_DEBIAN_PACKAGE_DEPENDS "gcc, libc6-dev")
-set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "g++, gnuplot-nox, ffmpeg, fonts-dejavu-core")
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "g++, python3, python3-numpy, gnuplot-nox, ffmpeg, fonts-dejavu-core")
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS "gcc-avr, avr-libc, binutils-avr, gdb, python3-pandas")
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_COMPRESSION_TYPE xz)

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -14,6 +13,7 @@
 #include "core/observations/variable_sampler.hpp"
 #include "idl/manifest.pb.h"
 #include "services/behaviours/host_memory.hpp"
+#include "services/comm/firmware_robots.hpp"
 
 namespace kilotwin::arenas {
 namespace {
@@ -104,27 +104,34 @@ std::string Arena::name_of(std::size_t index) const {
 }
 
 double Arena::variable(std::size_t index, std::uint32_t robot) const {
-  if (name_of(index) == kBatteryVariable && !plan_->firmware(robot) && !plan_->tracked(robot))
-    return host_of(robot).battery_V(robot);
+  if (name_of(index) == kBatteryVariable && !plan_->tracked(robot)) {
+    if (!plan_->firmware(robot)) return host_of(robot).battery_V(robot);
+    const comm::FirmwareRobots& robots = *engines_.radio().firmware();
+    return robots.battery_V(comm::index_of(robot, robots));
+  }
   const VariablePlace* const place = place_of(index, robot);
   if (place == nullptr) return std::numeric_limits<double>::quiet_NaN();
   const std::optional<std::uint64_t> raw = place->fetch(robot, behaviours::HostMemory(host_of(robot)));
   return raw ? place->number(*raw) : std::numeric_limits<double>::quiet_NaN();
 }
 
-void Arena::set_variable(std::size_t index, std::uint32_t robot, double value) {
+Arena::Write Arena::writing(std::size_t index, std::uint32_t robot, double value) const {
   const VariablePlace* const place = place_of(index, robot);
-  behaviours::BehavioursEngine& host = host_of(robot);
-  const behaviours::HostMemory memory(host);
+  const behaviours::HostMemory memory(host_of(robot));
   const auto address = place == nullptr ? std::nullopt : place->address(robot, memory);
   const auto before = place == nullptr ? std::nullopt : place->fetch(robot, memory);
   if (!address || !before)
     throw UserError(fmt::format("robot {} has no variable {} that can be set", robot, name_of(index)));
   const std::optional<std::uint64_t> after = place->with(value, *before);
   if (!after) throw UserError(fmt::format("robot {}: {} cannot hold {:g}", robot, name_of(index), value));
-  std::array<std::uint8_t, 8> octets{};
-  for (std::size_t i = 0; i < place->octets(); ++i) octets.at(i) = static_cast<std::uint8_t>(*after >> 8 * i);
-  KILOTWIN_DEMAND(host.write(robot, *address, std::span(octets).first(place->octets())));
+  Write write{robot, *address, place->octets(), {}};
+  for (std::size_t i = 0; i < write.octets; ++i) write.content.at(i) = static_cast<std::uint8_t>(*after >> 8 * i);
+  return write;
+}
+
+void Arena::write(const Write& write) {
+  KILOTWIN_DEMAND(
+      host_of(write.robot).write(write.robot, write.address, std::span(write.content).first(write.octets)));
 }
 
 }  // namespace kilotwin::arenas

@@ -4,6 +4,8 @@
 /// changes of variables are inputs beside the experiment; a run that a recording describes has no such changes of variables.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -48,10 +50,19 @@ class Arena {
   void place(const Relocation& where);
 
   [[nodiscard]] std::size_t variables() const { return places_.size(); }
-  /// NaN where the robot's program has no such variable, or it runs as firmware. Batteries: core/observations/variable_sampler.hpp.
+  /// NaN where the robot's program has no such variable, or it runs as firmware. Batteries, those of firmware robots included:
+  /// core/observations/variable_sampler.hpp.
   [[nodiscard]] double variable(std::size_t index, std::uint32_t robot) const;
-  /// Throws UserError where variable() would be NaN, or the variable cannot hold the value.
-  void set_variable(std::size_t index, std::uint32_t robot, double value);
+  /// What sets a variable of a robot's program.
+  struct Write {
+    std::uint32_t robot = 0;
+    std::uint64_t address = 0;
+    std::size_t octets = 0;
+    std::array<std::uint8_t, 8> content{};  ///< the first `octets` of them
+  };
+  /// Changes nothing yet. Throws UserError where variable() would be NaN, or the variable cannot hold the value.
+  [[nodiscard]] Write writing(std::size_t index, std::uint32_t robot, double value) const;
+  void write(const Write& write);
   /// For a watchdog.
   [[nodiscard]] const std::vector<std::unique_ptr<behaviours::BehavioursEngine>>& hosts() const {
     return engines_.hosts();

@@ -112,16 +112,20 @@ void Batch::place(std::span<const std::uint32_t> arenas, const Relocation& where
 void Batch::set_variable(std::size_t index) {
   const std::uint32_t robots = plan().robots();
   const std::span<const double> wanted = arrays_.array<const double>(kWanted);
+  std::vector<std::vector<Arena::Write>> writes(count());
   for (std::uint32_t i = 0; i < count(); ++i) {
     for (std::uint32_t robot = 0; robot < robots; ++robot) {
       const double value = wanted[std::size_t{i} * robots + robot];
       if (std::isnan(value)) continue;
       try {
-        arenas_[i]->set_variable(index, robot, value);
+        writes[i].push_back(arenas_[i]->writing(index, robot, value));
       } catch (const UserError& error) {
         throw UserError(fmt::format("arena {}, {}", i, error.what()));
       }
     }
+  }
+  for (std::uint32_t i = 0; i < count(); ++i) {
+    for (const Arena::Write& write : writes[i]) arenas_[i]->write(write);
     show(i);
   }
 }

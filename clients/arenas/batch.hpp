@@ -40,8 +40,8 @@ class Batch {
   void send(std::span<const std::uint32_t> arenas, const OverheadPacket& packet);
   /// As Arena::place() in each of them. Throws UserError; then none has taken it.
   void place(std::span<const std::uint32_t> arenas, const Relocation& where);
-  /// Sets the variable to `wanted`, except where that is NaN. Throws UserError, with the arena, where it cannot; then some robots
-  /// may have been changed.
+  /// Sets the variable to `wanted`, except where that is NaN. Throws UserError, with the arena, where it cannot; then no robot has
+  /// been changed.
   void set_variable(std::size_t index);
   [[nodiscard]] const Arena& arena(std::uint32_t index) const { return *arenas_[index]; }
 

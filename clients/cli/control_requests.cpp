@@ -46,7 +46,8 @@ Status act(RunControl& control, const ControlRequest& request, const Status& bef
     return control.find(request.patience);
   }
   ask(kilotwin_open_CHECKPOINT_RUN);
-  return before;
+  return control.await([&](const Status& now) { return now.saved_tick > 0 && now.saved_tick >= before.tick; },
+                       "save its state", request.patience);
 }
 
 ControlRequest request_of(const ordered_json& line, std::chrono::duration<double> patience) {
@@ -83,19 +84,21 @@ ControlRequest request_of(const ordered_json& line, std::chrono::duration<double
   return request;
 }
 
-/// The newest state of the swarm.
+/// States of the swarm as they come.
 class States {
  public:
   explicit States(std::uint32_t domain) : observer_({domain, {}}) {}
 
-  /// Waits for the first one within the patience.
-  ordered_json newest(std::chrono::duration<double> patience) {
+  /// The newest state, of tick `from` or later. Waits for it within the patience.
+  ordered_json newest(std::int64_t from, std::chrono::duration<double> patience) {
     using namespace std::chrono_literals;
     const auto until = std::chrono::steady_clock::now() + patience;
-    while (observer_.wait(observer_.state() == nullptr ? 20ms : 0ms) != observe::News::kNothing ||
-           observer_.state() == nullptr) {
-      if (observer_.state() == nullptr && std::chrono::steady_clock::now() > until)
-        throw RunError(fmt::format("no state of the swarm within {:g} s", patience.count()));
+    const auto awaited = [&] {
+      return observer_.state() == nullptr || observer_.state()->swarm.tick.count() < from;
+    };
+    while (observer_.wait(awaited() ? 20ms : 0ms) != observe::News::kNothing || awaited()) {
+      if (awaited() && std::chrono::steady_clock::now() > until)
+        throw RunError(fmt::format("no state of the swarm from tick {} on within {:g} s", from, patience.count()));
     }
     const observe::SwarmAt& state = *observer_.state();
     const SwarmView& swarm = state.swarm;
@@ -153,8 +156,20 @@ ordered_json in_json(const Status& status) {
           {"robots_failed", status.robots_failed},
           {"sent", status.sent},
           {"received", status.received},
-          {"note", status.note}};
+          {"note", status.note},
+          {"saved_tick", status.saved_tick}};
 }
+
+namespace {
+
+/// The newest state. A paused run shows states of the tick at which it stands twice a second; an earlier one is older than the
+/// status that the last request has answered.
+ordered_json newest_state(RunControl& control, States& states, std::chrono::duration<double> patience) {
+  const Status status = control.find(patience);
+  return states.newest(status.phase == kilotwin_open_PAUSED ? status.tick : 0, patience);
+}
+
+}  // namespace
 
 void serve_requests(std::uint32_t domain, std::chrono::duration<double> patience) {
   RunControl control(domain);
@@ -166,7 +181,8 @@ void serve_requests(std::uint32_t domain, std::chrono::duration<double> patience
   for (std::string line; std::getline(std::cin, line);) {
     try {
       const ControlRequest request = request_of(ordered_json::parse(line), patience);
-      say_line(request.command == "state" ? states.newest(patience) : in_json(carry_out(control, request)));
+      say_line(request.command == "state" ? newest_state(control, states, patience)
+                                          : in_json(carry_out(control, request)));
     } catch (const UserError& error) {
       say_line({{"error", error.what()}, {"status", 2}});
     } catch (const RunError& error) {

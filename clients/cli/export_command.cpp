@@ -24,7 +24,7 @@ namespace {
 
 struct ExportArguments {
   std::filesystem::path run, trajectories, bodies, messages, radio, cells, mcap, model;
-  std::filesystem::path variables, events, commands, observables, environment;
+  std::filesystem::path variables, events, commands, observables, environment, pogosim;
   double every_s = 1;
   bool measured = false;
 };
@@ -52,15 +52,14 @@ int export_run(const ExportArguments& arguments) {
   const std::vector<const std::filesystem::path*> tables{
       &arguments.trajectories, &arguments.bodies,      &arguments.messages, &arguments.radio,
       &arguments.cells,        &arguments.variables,   &arguments.events,   &arguments.commands,
-      &arguments.observables,  &arguments.environment, &arguments.mcap};
+      &arguments.observables,  &arguments.environment, &arguments.pogosim,  &arguments.mcap};
   const bool rows_wanted =
       std::any_of(tables.begin(), tables.end(), [](const auto* table) { return !table->empty(); });
   if (!rows_wanted && arguments.model.empty()) {
     throw UserError(
         "export: nothing to export; give --trajectories FILE, --variables FILE, --events FILE, --commands FILE, "
         "--observables FILE, --environment FILE, --bodies FILE, --messages FILE, --radio FILE, --cells FILE, "
-        "--mcap FILE, "
-        "--model FILE or several; a table ends in .csv, .csv.gz, .npz or .arrow");
+        "--pogosim FILE, --mcap FILE, --model FILE or several; a table ends in .csv, .csv.gz, .npz or .arrow");
   }
   if (!arguments.model.empty()) {
     const auto run = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kManifest);
@@ -86,6 +85,9 @@ int export_run(const ExportArguments& arguments) {
     return recorder::export_trajectories(reader, file, arguments.every_s,
                                          arguments.measured ? recorder::Poses::kMeasured : recorder::Poses::kTrue,
                                          about);
+  });
+  each(arguments.pogosim, [&](Reader& reader, const auto& file) {
+    return recorder::export_pogosim(reader, file, arguments.every_s, about);
   });
   each(arguments.bodies, [&](Reader& reader, const auto& file) {
     return recorder::export_bodies(reader, file, arguments.every_s, about);
@@ -149,6 +151,9 @@ Command add_export(CLI::App& program) {
       ->type_name("FILE");
   app.add_option("--cells", arguments->cells,
                  "positions as a floor of 50 mm cells measures them: columns time_s,robot,x_mm,y_mm")
+      ->type_name("FILE");
+  app.add_option("--pogosim", arguments->pogosim,
+                 fmt::format("for programs that read pogosim's tables: columns {}", recorder::kPogosimColumns))
       ->type_name("FILE");
   app.add_option("--mcap", arguments->mcap, "for Foxglove, Lichtblick and Rerun: robots, bodies, counters, log")
       ->type_name("FILE");

@@ -83,8 +83,13 @@ void import_experiment(const ImportArguments& arguments, const fs::path& out, co
   if (!arguments.format.empty() || arguments.unit_mm)
     throw UserError("--format and --unit-mm: are for logs of trackers");
   const std::string text = os::read_file(arguments.file), name = arguments.file.string();
+  // pogosim takes paths from the folder where it runs, which need not be that of the configuration.
+  const auto read_beside = [&](const std::string& file) {
+    const auto beside = os::read_if_there(arguments.file.parent_path() / file);
+    return beside ? beside : os::read_if_there(file);
+  };
   Imported imported = ending == ".json" ? importers::from_kilombo(text, name)
-                      : yaml            ? importers::from_pogosim(text, name)
+                      : yaml            ? importers::from_pogosim(text, name, read_beside)
                                         : importers::from_argos(text, name);
   if (!arguments.behaviour.empty()) {
     for (proto::RobotGroup& group : *imported.experiment.mutable_robots())

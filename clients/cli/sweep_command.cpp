@@ -7,9 +7,11 @@
 #include <optional>
 
 #include "clients/cli/commands.hpp"
+#include "clients/cli/model_files.hpp"
 #include "clients/cli/observable_choice.hpp"
 #include "clients/cli/prepare.hpp"
 #include "clients/cli/run_arguments.hpp"
+#include "clients/cli/sweep_designs.hpp"
 #include "clients/cli/sweep_points.hpp"
 #include "clients/cli/sweep_report.hpp"
 #include "clients/cli/sweep_runs.hpp"
@@ -35,6 +37,8 @@ struct SweepArguments {
   /// The observable in the plots: clients/recorder/observables.hpp, or one of the experiment. Empty: pushed if there are movable bodies,
   /// else msd.
   std::string plot;
+  std::vector<fs::path> models;  ///< files and directories of models, each of which runs with every point
+  std::string goal = "largest";  ///< with models: which value of the observable is better
   std::string colour_by, x_axis = "auto", y_axis = "linear";
   std::uint32_t jobs = 0;  ///< runs at a time; 0: one per core
   fs::path resume;         ///< a sweep to go on with
@@ -56,6 +60,7 @@ struct Sweep {
   std::vector<SweepPoint> points;
   std::vector<std::uint64_t> own_seeds;  ///< per point: the seed that the experiment states
   recorder::Observable plotted = recorder::Observable::kMsd;
+  SweepContent content;
   fs::path directory, fallback;
   std::vector<SweepRun> runs;
 };
@@ -65,16 +70,25 @@ Sweep checked(const SweepArguments& arguments) {
   Sweep sweep;
   sweep.points = arguments.latin > 0 ? latin_points(arguments.set, arguments.latin, arguments.latin_seed)
                                      : sweep_points(arguments.set);
+  const std::vector<fs::path> models = model_files("--models", arguments.models);
+  if (!models.empty()) sweep.points = with_models(sweep.points, models);
   for (const SweepPoint& point : sweep.points) {
     RunArguments one = arguments.run;
-    one.set = point;
+    for (const std::string& set : point) {
+      if (is_model(set))
+        one.model = set.substr(set.find('=') + 1);
+      else
+        one.set.push_back(set);
+    }
     const LoadedExperiment loaded = load_with_overrides(one);
-    static_cast<void>(resolve(loaded, one, Notes::kSilent));
+    sweep.content.add(resolve(loaded, one, Notes::kSilent));
     sweep.name = loaded.experiment.name();
     if (!arguments.plot.empty()) check_observable("--plot", arguments.plot, loaded.experiment);
     if (loaded.experiment.movable_size() > 0) sweep.plotted = recorder::Observable::kPushed;
     sweep.own_seeds.push_back(loaded.experiment.seed());
   }
+  if (!arguments.run.model.empty()) sweep.content.add_file(arguments.run.model);
+  for (const fs::path& model : models) sweep.content.add_file(model);
   if (const auto wanted = built_in_observable(arguments.plot)) sweep.plotted = *wanted;
   if (!arguments.colour_by.empty())
     static_cast<void>(SweepColours(sweep.points, arguments.colour_by, std::nullopt));
@@ -102,7 +116,9 @@ SweepPlots plots_of(const SweepArguments& arguments, const Sweep& sweep) {
   const AxisScale x = arguments.x_axis == "log"      ? AxisScale::kLogarithmic
                       : arguments.x_axis == "linear" ? AxisScale::kLinear
                                                      : AxisScale::kAutomatic;
-  return {sweep.plotted, arguments.plot, arguments.colour_by, x, arguments.y_axis == "log"};
+  SweepPlots plots{sweep.plotted, arguments.plot, arguments.colour_by, x, arguments.y_axis == "log", {}};
+  if (!arguments.models.empty()) plots.largest = arguments.goal == "largest";
+  return plots;
 }
 
 /// The results of a sweep as they come.
@@ -123,7 +139,6 @@ class Results {
   [[nodiscard]] std::size_t failed() const { return failed_; }
   void say_how_many_failed() const {
     if (failed_ > kMostComplaints) say(fmt::format("kilotwin: and {} more runs failed", failed_ - kMostComplaints));
-    if (failed_ > 0) say("kilotwin: runs.csv lists the runs that failed, and why");
   }
 
  private:
@@ -146,6 +161,7 @@ void print_results(const SweepArguments& arguments, const Sweep& sweep, const Sw
   if (report.has_response()) plots += " and " + (directory / "response.svg").string();
   fmt::print("{}runs    {}\ntable   {}\ncurves  {}\n", report.table(), (directory / "runs.csv").string(),
              (directory / "sweep.csv").string(), (directory / "curves.csv").string());
+  if (!arguments.models.empty()) fmt::print("designs {}\n", (directory / "designs.csv").string());
   if (plotted)
     fmt::print("plot    {}\nreport  {}\n", plots, (directory / "report.html").string());
   else
@@ -160,14 +176,17 @@ int sweep(const SweepArguments& arguments) {
   warn_beyond_cores("--jobs", arguments.jobs);
   Sweep sweep = checked(arguments);
   sweep.fallback = fs::path("runs") / (sweep.name + "-sweep");
+  const SweepPlan plan{arguments.run.experiment, sweep.points, words_of(arguments, {}, {}), sweep.content};
   if (arguments.resume.empty()) {
-    sweep.directory = make_plain_output(arguments.run.output, sweep.fallback,
-                                        {arguments.run.experiment, arguments.run.model, arguments.run.behaviour});
+    std::vector<fs::path> inputs = arguments.models;
+    inputs.insert(inputs.end(), {arguments.run.experiment, arguments.run.model, arguments.run.behaviour});
+    sweep.directory = make_plain_output(arguments.run.output, sweep.fallback, inputs);
     add_runs(arguments, sweep);
-    write_plan(sweep.directory, plan_text(arguments.run.experiment, sweep.points, words_of(arguments, {}, {})));
+    write_plan(sweep.directory, plan);
   } else {
     sweep.directory = arguments.resume;
-    check_plan(sweep.directory, plan_text(arguments.run.experiment, sweep.points, words_of(arguments, {}, {})));
+    check_plan(sweep.directory, plan);
+    require_no_job(sweep.directory);
     add_runs(arguments, sweep);
   }
 
@@ -196,8 +215,12 @@ int sweep(const SweepArguments& arguments) {
         "does the others",
         report.runs(), sweep.runs.size(), sweep.directory.string()));
   }
-  if (report.runs() == 0) return kFailed;
+  if (report.runs() + results.failed() == 0) return kFailed;
   const bool plotted = report.write(sweep.directory, recorder::provenance_of_this_process());
+  if (results.failed() > 0)
+    say(fmt::format("kilotwin: {}{} lists the runs that failed, and why",
+                    report.runs() == 0 ? "no run came to its end; " : "", (sweep.directory / "runs.csv").string()));
+  if (report.runs() == 0) return kFailed;
   print_results(arguments, sweep, report, plotted);
   return results.failed() == 0 && all ? kDone : kFailed;
 }
@@ -218,6 +241,19 @@ Command add_sweep(CLI::App& program) {
                  "what the plots show: an observable of the experiment, or msd, displacement, spread, nearest, "
                  "polarisation or pushed (default: pushed where there are movable bodies, else msd)")
       ->type_name("OBSERVABLE");
+  CLI::Option* const models =
+      app.add_option(
+             "--models", arguments->models,
+             "model files, or directories of them; every point runs with each, and the points are ranked by their "
+             "worst model")
+          ->type_name("DIR|FILE...");
+  models->excludes(app.get_option("--model"));
+  app.add_option("--goal", arguments->goal,
+                 "with --models: which value of the plotted observable is better: largest or smallest")
+      ->check(CLI::IsMember({"largest", "smallest"}).description(""))
+      ->capture_default_str()
+      ->needs(models)
+      ->type_name("WHICH");
   app.add_option("--colour-by", arguments->colour_by,
                  "a swept field: in the plots, all runs with the same value are one curve; or group: a curve per "
                  "group of robots")

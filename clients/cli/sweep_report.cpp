@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "clients/cli/text_table.hpp"
 #include "clients/recorder/reader.hpp"
 #include "clients/recorder/summary.hpp"
 #include "clients/report/html.hpp"
@@ -35,25 +36,15 @@ std::string csv_pair(const Sample& sample) {
 
 std::string csv_number(double value) { return std::isfinite(value) ? fmt::format(",{:.10g}", value) : ","; }
 
-/// Formats rows as columns, the first left-aligned and the others right-aligned. "±" is one character of two bytes.
-std::string aligned(const std::vector<std::vector<std::string>>& rows) {
-  const auto width_of = [](const std::string& cell) {
-    return static_cast<std::size_t>(std::count_if(
-        cell.begin(), cell.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
+std::string html_table(const std::vector<std::vector<std::string>>& rows) {
+  const auto escaped = [](const std::vector<std::string>& row) {
+    std::vector<std::string> cells;
+    for (const std::string& cell : row) cells.push_back(html::escaped(cell));
+    return cells;
   };
-  std::vector<std::size_t> width(rows[0].size(), 0);
-  for (const auto& row : rows) {
-    for (std::size_t i = 0; i < row.size(); ++i) width[i] = std::max(width[i], width_of(row[i]));
-  }
-  std::string text;
-  for (const auto& row : rows) {
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      const std::string padding(width[i] - width_of(row[i]), ' ');
-      text += i == 0 ? row[i] + padding : "   " + padding + row[i];
-    }
-    text += '\n';
-  }
-  return text;
+  html::Table table(escaped(rows[0]));
+  for (std::size_t i = 1; i < rows.size(); ++i) table.row(escaped(rows[i]));
+  return table.text();
 }
 
 }  // namespace
@@ -95,7 +86,10 @@ void SweepReport::choose_response() {
 void SweepReport::add(std::size_t point, std::uint64_t seed, const std::filesystem::path& run) {
   const recorder::Summary summary = recorder::read_summary(run / "summary.json");
   recorder::Reader reader(run / "recording.ktrec");
-  const recorder::ObservableCurves curves = recorder::observe(reader);
+  const bool groups = colours_ && colours_->by_group();
+  const std::vector<recorder::ObservableCurves> observed =
+      groups ? recorder::observe_with_groups(reader) : std::vector{recorder::observe(reader)};
+  const recorder::ObservableCurves& curves = observed.front();
   std::vector<std::string> own;
   for (const recorder::OwnCurve& curve : curves.own) own.push_back(curve.name);
   if (runs_ == 0) own_ = own;
@@ -132,24 +126,15 @@ void SweepReport::add(std::size_t point, std::uint64_t seed, const std::filesyst
       if (i + 1 == states) at.at_end[o].add(value);
     }
   }
-  if (colours_) take_colours(point, curves, run);
+  if (!colours_) return;
+  if (!groups) return colours_->add(point, 0, curve_of(curves));
+  for (std::size_t group = 0; group + 1 < observed.size(); ++group)
+    colours_->add(point, group, curve_of(observed[group + 1]));
 }
 
 ObservedCurve SweepReport::curve_of(const recorder::ObservableCurves& curves) const {
   const std::size_t o = plotted();
   return {curves.time_s, o < kObservables.size() ? curves.value[o] : curves.own[o - kObservables.size()].value};
-}
-
-void SweepReport::take_colours(std::size_t point, const recorder::ObservableCurves& curves,
-                               const std::filesystem::path& run) {
-  if (!colours_->by_group()) return colours_->add(point, 0, curve_of(curves));
-  const recorder::Reader first(run / "recording.ktrec");
-  const int groups = std::max(1, first.header().group_robots_size());
-  for (int group = 0; group < groups; ++group) {
-    recorder::Reader reader(run / "recording.ktrec");
-    const auto number = static_cast<std::uint32_t>(group);
-    colours_->add(point, number, curve_of(recorder::observe_group(reader, number)));
-  }
 }
 
 void SweepReport::add_failed(std::size_t point, std::uint64_t seed, const std::filesystem::path& run,
@@ -248,7 +233,25 @@ std::vector<std::vector<std::string>> SweepReport::rows() const {
   return rows;
 }
 
-std::string SweepReport::table() const { return aligned(rows()); }
+std::string SweepReport::table() const {
+  std::string text = aligned(rows());
+  if (const std::vector<Design> ranked = designs(); !ranked.empty())
+    text += "\n" + aligned(design_rows(ranked, plotted_name()));
+  return text;
+}
+
+std::string SweepReport::plotted_name() const {
+  return plotted() < kObservables.size() ? std::string(kObservables[plotted()].name) : plots_.own;
+}
+
+std::vector<Design> SweepReport::designs() const {
+  if (!plots_.largest) return {};
+  SweepDesigns designs(points_, *plots_.largest);
+  for (const Run& run : all_runs_) {
+    if (run.failure.empty()) designs.add(run.point, run.seed, run.at_end[plotted()]);
+  }
+  return designs.ranked();
+}
 
 std::string SweepReport::page(const recorder::Provenance& provenance) const {
   using html::Data;
@@ -257,15 +260,9 @@ std::string SweepReport::page(const recorder::Provenance& provenance) const {
     for (const auto& [key, value] : fields) data.set(key, value);
     return data;
   };
-  const std::vector<std::vector<std::string>> all = rows();
-  std::vector<std::string> heads;
-  for (const std::string& head : all[0]) heads.push_back(html::escaped(head));
-  html::Table table(std::move(heads));
-  for (std::size_t i = 1; i < all.size(); ++i) {
-    std::vector<std::string> cells;
-    for (const std::string& cell : all[i]) cells.push_back(html::escaped(cell));
-    table.row(cells);
-  }
+  std::string tables = html_table(rows());
+  if (const std::vector<Design> ranked = designs(); !ranked.empty())
+    tables += html_table(design_rows(ranked, plotted_name()));
   Data figures{Data::type::list};
   const auto add = [&](const Plot& plot, const std::string& caption) {
     figures << object({{"image", html::image(plot_svg(plot), caption)}, {"caption", caption}});
@@ -282,7 +279,7 @@ std::string SweepReport::page(const recorder::Provenance& provenance) const {
         {"tables", "runs.csv (a row per run), sweep.csv (at the end), curves.csv (over time)"}}) {
     facts << object({{"fact", fact}, {"value", value}});
   }
-  Data page = object({{"name", name_}, {"date", provenance.date}, {"runs", runs_text()}, {"table", table.text()}});
+  Data page = object({{"name", name_}, {"date", provenance.date}, {"runs", runs_text()}, {"table", tables}});
   if (const std::string fields = constant(); !fields.empty()) page.set("constant", fields);
   page.set("figures", figures);
   page.set("facts", facts);
@@ -297,8 +294,11 @@ bool SweepReport::write(const std::filesystem::path& directory, const recorder::
     writer.close();
   };
   table("runs.csv", runs_csv());
+  if (runs_ == 0) return false;
   table("sweep.csv", table_csv());
   table("curves.csv", curves_csv());
+  if (const std::vector<Design> ranked = designs(); !ranked.empty())
+    table("designs.csv", designs_csv(ranked, plotted_name()));
   if (!Gnuplot::installed()) return false;
   write_plot(curves(), directory / "sweep.svg");
   if (has_response()) write_plot(response(), directory / "response.svg");

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "clients/cli/sweep_colours.hpp"
+#include "clients/cli/sweep_designs.hpp"
 #include "clients/cli/sweep_points.hpp"
 #include "clients/recorder/observables.hpp"
 #include "clients/recorder/provenance.hpp"
@@ -28,6 +29,8 @@ struct SweepPlots {
   /// Of the swept field. Automatic: logarithmic where the values have equal ratios.
   AxisScale x = AxisScale::kAutomatic;
   bool y_logarithmic = false;
+  /// Of a sweep over several models: whether a larger value of the observable is better. Nothing: there are no designs to rank.
+  std::optional<bool> largest;
 };
 
 class SweepReport {
@@ -42,12 +45,12 @@ class SweepReport {
   /// Number of runs added.
   [[nodiscard]] std::size_t runs() const { return runs_; }
 
-  /// The table for the terminal: one line per point.
+  /// The table for the terminal: one line per point; with several models one more per design.
   [[nodiscard]] std::string table() const;
   /// A page with the table, the plots and the provenance.
   [[nodiscard]] std::string page(const recorder::Provenance& provenance) const;
-  /// Writes runs.csv, sweep.csv and curves.csv. With gnuplot also sweep.svg, response.svg if has_response(), and report.html. Returns
-  /// whether gnuplot is there. Throws RunError; the tables are written first.
+  /// Writes runs.csv and, where a run succeeded, sweep.csv, curves.csv, and designs.csv if there are designs. With gnuplot also sweep.svg, response.svg if has_response(),
+  /// and report.html. Returns whether it wrote plots. Throws RunError; the tables are written first.
   [[nodiscard]] bool write(const std::filesystem::path& directory, const recorder::Provenance& provenance) const;
   /// One row per point: every observable at the end of the runs and the summaries' counts, each with mean and standard error.
   [[nodiscard]] std::string table_csv() const;
@@ -55,6 +58,8 @@ class SweepReport {
   [[nodiscard]] std::string runs_csv() const;
   /// One row per point and recorded state: every observable with mean and standard error.
   [[nodiscard]] std::string curves_csv() const;
+  /// The designs of a sweep over several models, by rank; none without such.
+  [[nodiscard]] std::vector<Design> designs() const;
   /// The plotted observable over time, one curve per point.
   [[nodiscard]] Plot curves() const;
   /// Whether a field was swept over numbers, so that response() can plot against it.
@@ -93,6 +98,7 @@ class SweepReport {
   };
   [[nodiscard]] std::size_t observables() const { return recorder::kObservables.size() + own_.size(); }
   [[nodiscard]] std::size_t plotted() const;
+  [[nodiscard]] std::string plotted_name() const;
   [[nodiscard]] std::string csv_header(const std::string& first) const;
   [[nodiscard]] std::string fields_header() const;
   [[nodiscard]] std::string fields_of(std::size_t point) const;
@@ -101,7 +107,6 @@ class SweepReport {
   [[nodiscard]] bool x_logarithmic() const;
   /// The plotted observable over time.
   [[nodiscard]] ObservedCurve curve_of(const recorder::ObservableCurves& curves) const;
-  void take_colours(std::size_t point, const recorder::ObservableCurves& curves, const std::filesystem::path& run);
 
   std::string name_;
   std::vector<SweepPoint> points_;

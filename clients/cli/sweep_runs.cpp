@@ -7,6 +7,7 @@
 
 #include "clients/cli/other_program.hpp"
 #include "clients/cli/progress.hpp"
+#include "clients/cli/sweep_designs.hpp"
 #include "core/base/error.hpp"
 #include "core/os/children.hpp"
 #include "core/os/interrupt.hpp"
@@ -51,7 +52,12 @@ std::vector<std::string> run_words(const RunArguments& arguments, const SweepPoi
   std::vector<std::string> words{
       "kilotwin", "run", arguments.experiment.string(), "--mode", "local", "--quiet", "--out", directory.string()};
   if (seed) words.insert(words.end(), {"--seed", std::to_string(*seed)});
-  for (const std::string& set : point) words.insert(words.end(), {"--set", set});
+  for (const std::string& set : point) {
+    if (is_model(set))
+      words.insert(words.end(), {"--model", set.substr(set.find('=') + 1)});
+    else
+      words.insert(words.end(), {"--set", set});
+  }
   for (const std::string& define : arguments.define) words.insert(words.end(), {"--define", define});
   if (arguments.duration_s) words.insert(words.end(), {"--duration", fmt::format("{}", *arguments.duration_s)});
   if (arguments.robots) words.insert(words.end(), {"--robots", std::to_string(*arguments.robots)});

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 #include <thread>
+#include <utility>
 
 #include "clients/cli/progress.hpp"
 #include "clients/cli/shell_words.hpp"
@@ -23,6 +25,8 @@ namespace fs = std::filesystem;
 /// Slurm's default MaxArraySize is 1001; beyond it, an element does several runs.
 constexpr std::size_t kMostElements = 1000;
 constexpr auto kQueuePoll = std::chrono::seconds(1);
+/// A controller that restarts, or is busy, does not answer for a while. Its jobs run on.
+constexpr auto kSlurmPatience = std::chrono::minutes(10);
 
 fs::path required_tool(const char* name) {
   const fs::path tool = os::find_executable(name);
@@ -71,22 +75,45 @@ std::string last_line_of(const fs::path& log) {
   return text.substr(text.rfind('\n') + 1);
 }
 
-/// Whether the job has elements that wait or run.
-bool in_queue(const fs::path& squeue, const std::string& job) {
-  const os::ProcessResult result = os::run_process({squeue.string(), "--noheader", "--jobs", job});
-  // Slurm forgets a job some time after its end.
-  if (!result.end.well() && result.errors.find("Invalid job id") != std::string::npos) return false;
-  if (!result.end.well()) throw RunError("squeue: " + first_line(result.errors));
-  return !result.output.empty();
-}
+fs::path job_file(const fs::path& directory) { return directory / "slurm-job"; }
 
-}  // namespace
+/// Whether a job has elements that wait or run.
+class JobWatch {
+ public:
+  JobWatch(fs::path squeue, std::string job) : squeue_(std::move(squeue)), job_(std::move(job)) {}
 
-bool run_on_slurm(std::vector<SweepRun>& runs, const fs::path& directory, const std::vector<std::string>& options,
-                  const std::function<void(const SweepRun&)>& ended) {
-  if (runs.empty()) return true;
-  const fs::path sbatch = required_tool("sbatch"), squeue = required_tool("squeue"),
-                 scancel = required_tool("scancel");
+  /// Nothing: squeue fails. Throws RunError where it has failed for kSlurmPatience.
+  [[nodiscard]] std::optional<bool> in_queue() {
+    const os::ProcessResult result = os::run_process({squeue_.string(), "--noheader", "--jobs", job_});
+    // Slurm forgets a job some time after its end.
+    if (!result.end.well() && result.errors.find("Invalid job id") != std::string::npos) return false;
+    if (result.end.well()) {
+      answered_ = Clock::now();
+      said_ = false;
+      return !result.output.empty();
+    }
+    if (Clock::now() > answered_ + kSlurmPatience)
+      throw RunError(
+          fmt::format("squeue has failed for {} minutes: {}; job {} goes on; once it has ended, --resume "
+                      "merges its runs",
+                      kSlurmPatience.count(), first_line(result.errors), job_));
+    if (!said_) say(fmt::format("kilotwin: squeue fails: {}; asking again", first_line(result.errors)));
+    said_ = true;
+    return std::nullopt;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  const fs::path squeue_;
+  const std::string job_;
+  Clock::time_point answered_ = Clock::now();
+  bool said_ = false;
+};
+
+/// Submits the array of runs and returns the job's id. Throws RunError.
+std::string submit(const std::vector<SweepRun>& runs, const fs::path& directory,
+                   const std::vector<std::string>& options) {
+  const fs::path sbatch = required_tool("sbatch");
   const std::size_t runs_each = (runs.size() + kMostElements - 1) / kMostElements;
   const std::size_t elements = (runs.size() + runs_each - 1) / runs_each;
   os::write_file(directory / "commands", commands_of(runs));
@@ -97,11 +124,43 @@ bool run_on_slurm(std::vector<SweepRun>& runs, const fs::path& directory, const 
   words.push_back(script.string());
   const os::ProcessResult submitted = os::run_process(words);
   if (!submitted.end.well()) throw RunError("--slurm: sbatch refused the job: " + first_line(submitted.errors));
-  const std::string job = first_line(submitted.output.substr(0, submitted.output.find(';')));
+  std::string job = first_line(submitted.output.substr(0, submitted.output.find(';')));
+  os::write_file(job_file(directory), job + "\n");
   say(fmt::format("kilotwin: job {} of Slurm, {} runs in {} elements", job, runs.size(), elements));
+  return job;
+}
+
+}  // namespace
+
+void require_no_job(const fs::path& directory) {
+  const auto text = os::read_if_there(job_file(directory));
+  if (!text) return;
+  const std::string job = first_line(*text);
+  const fs::path squeue = os::find_executable("squeue");
+  if (squeue.empty())
+    throw UserError(fmt::format(
+        "--resume: job {} of Slurm may still write to {}, and there is no squeue on this machine to ask; "
+        "resume where it is, or remove {} if the job has ended",
+        job, directory.string(), job_file(directory).string()));
+  JobWatch watch(squeue, job);
+  std::optional<bool> queued = watch.in_queue();
+  for (; !queued; queued = watch.in_queue()) std::this_thread::sleep_for(kPoll);
+  if (*queued)
+    throw UserError(
+        fmt::format("--resume: job {} of Slurm is still in the queue and does these runs; wait for its end, or end "
+                    "it by scancel {}",
+                    job, job));
+  fs::remove(job_file(directory));
+}
+
+bool run_on_slurm(std::vector<SweepRun>& runs, const fs::path& directory, const std::vector<std::string>& options,
+                  const std::function<void(const SweepRun&)>& ended) {
+  if (runs.empty()) return true;
+  const fs::path squeue = required_tool("squeue"), scancel = required_tool("scancel");
+  const std::string job = submit(runs, directory, options);
 
   Progress progress(true);
-  while (in_queue(squeue, job)) {
+  for (JobWatch watch(squeue, job); watch.in_queue().value_or(true);) {
     if (interrupted() != 0) {
       static_cast<void>(os::run_process({scancel.string(), job}));
       return false;
@@ -116,6 +175,7 @@ bool run_on_slurm(std::vector<SweepRun>& runs, const fs::path& directory, const 
     std::this_thread::sleep_for(kQueuePoll);
   }
   progress.clear();
+  fs::remove(job_file(directory));
   for (SweepRun& run : runs) {
     run.well = is_complete(run);
     if (!run.well) {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -10,13 +12,37 @@
 
 namespace kilotwin::cli {
 
-/// What must be alike where a sweep goes on: experiment, points, options of its runs. Seeds may differ.
-[[nodiscard]] std::string plan_text(const std::filesystem::path& experiment, const std::vector<SweepPoint>& points,
-                                    const std::vector<std::string>& words);
+struct Resolved;
+
+/// What decides the results of a sweep's runs beside its words: contents of files, not their names.
+class SweepContent {
+ public:
+  /// Adds a point as resolved.
+  void add(const Resolved& point);
+  /// Adds a file that the words name. Throws UserError where it cannot be read.
+  void add_file(const std::filesystem::path& file);
+
+  /// SHA-256 of all points: places of robots, model, images, EEPROMs, without programs.
+  [[nodiscard]] std::string experiment() const;
+  /// SHA-256 of programs and plugins as compiled, and of other files, by name. One source may be compiled in several ways.
+  [[nodiscard]] const std::map<std::string, std::set<std::string>>& files() const { return files_; }
+
+ private:
+  std::string points_;  ///< a hash per point, one after the other
+  std::map<std::string, std::set<std::string>> files_;
+};
+
+/// What must be alike where a sweep goes on. Seeds may differ.
+struct SweepPlan {
+  std::filesystem::path experiment;
+  std::vector<SweepPoint> points;
+  std::vector<std::string> words;  ///< options of the runs
+  SweepContent content;
+};
 /// Writes it to DIR/sweep.json. Throws RunError.
-void write_plan(const std::filesystem::path& directory, const std::string& plan);
-/// Throws UserError where the directory holds no sweep, or another one.
-void check_plan(const std::filesystem::path& directory, const std::string& plan);
+void write_plan(const std::filesystem::path& directory, const SweepPlan& plan);
+/// Throws UserError where the directory holds no sweep, or another one, or the sweep of other contents or of another build of Kilotwin.
+void check_plan(const std::filesystem::path& directory, const SweepPlan& plan);
 
 /// Whether the run's directory holds a run of its seed that came to its end without failure.
 [[nodiscard]] bool is_complete(const SweepRun& run);

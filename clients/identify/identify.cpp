@@ -9,6 +9,7 @@
 #include "clients/identify/document.hpp"
 #include "clients/identify/findings.hpp"
 #include "clients/identify/fit/fitter.hpp"
+#include "clients/identify/fit/posterior_draws.hpp"
 #include "clients/identify/model/model_file.hpp"
 #include "clients/identify/predict/final_check.hpp"
 #include "clients/identify/replay/simulation_check.hpp"
@@ -20,6 +21,7 @@ namespace {
 
 /// Joint Monte Carlo rollouts of the predictions that are reported.
 constexpr std::uint32_t kRollouts = 64;
+constexpr std::uint32_t kDrawsSeed = 1;
 
 FitState without_term(const Fitter& fitter, const FitState& fit, std::size_t t) {
   FitState less = fit;
@@ -265,6 +267,8 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   out.document["horizon"] = horizon_curve(f, evaluation, options.threads);
   say_progress(0.95, "simulation check");
   out.model = proto_of(f.found.fit.model);
+  const PosteriorDraws posterior(f.found.fit.model, f.uncertainty);
+  for (std::uint32_t n = 1; n <= options.draws; ++n) out.draws.push_back(proto_of(posterior.draw(kDrawsSeed, n)));
   const proto::Model written_before = proto_of(f.base.model);
   const nlohmann::json simulated = simulation_check({f.base.model, written_before}, {f.found.fit.model, out.model},
                                                     f.after.tracks, evaluation.marked_only(), options.threads);

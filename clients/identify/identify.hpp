@@ -54,6 +54,7 @@ struct Options {
   double horizon_s = 10;
   std::uint32_t threads = 2;
   bool find_effects = true;  ///< false: the base model only
+  std::uint32_t draws = 0;   ///< models from the posterior; their values may lie outside the ranges of a model file
   /// Where the caller will write the model: for the text of the result.
   std::string model_file = "model.txtpb";
   /// Progress, 0..1, and the present step.
@@ -64,6 +65,7 @@ struct Identified {
   proto::Model model;  ///< input of `kilotwin run --model`
   nlohmann::json document;
   std::vector<Prediction> predictions;
+  std::vector<proto::Model> draws;
 };
 
 /// Fits the tracks of `train` that are not held out. Predicts `test`; null: the held-out tracks of `train`.

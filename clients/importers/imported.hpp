@@ -1,6 +1,8 @@
 /// Experiments of other simulators, as experiments of Kilotwin.
 #pragma once
 
+#include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,8 +31,12 @@ struct Imported {
 /// Parameters of Kilombo, a JSON object. `name` as above. Throws UserError.
 [[nodiscard]] Imported from_kilombo(std::string_view text, const std::string& name);
 
-/// A configuration of pogosim, in YAML. `name` as above. Throws UserError with the line, or if no object is a pogobot.
-[[nodiscard]] Imported from_pogosim(std::string_view text, const std::string& name);
+/// The content of a file that a configuration names; nothing where it cannot be read.
+using ReadNamed = std::function<std::optional<std::string>(const std::string& file)>;
+
+/// A configuration of pogosim, in YAML. `name` as above. `read`: for the table of initial poses, if it names one. Throws UserError with
+/// the line, or if no object is a pogobot.
+[[nodiscard]] Imported from_pogosim(std::string_view text, const std::string& name, const ReadNamed& read = {});
 
 /// The experiment file: the notes as comments, then the fields.
 [[nodiscard]] std::string experiment_text(const Imported& imported, const std::string& source);

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -49,13 +50,16 @@ const std::map<std::string, std::string>& reasons() {
   return all;
 }
 
+/// Up to here a double holds every whole number.
+constexpr double kLargestWhole = 0x1p53;
+
 class KilomboImport {
  public:
   KilomboImport(std::string_view text, const std::string& name) : name_(name) {
     try {
       // Kilombo's own files have comments.
       parameters_ = Json::parse(text, nullptr, true, true);
-    } catch (const Json::parse_error& error) {
+    } catch (const Json::exception& error) {
       throw UserError(fmt::format("{}: is no JSON: {}", name, error.what()));
     }
     if (!parameters_.is_object())
@@ -67,7 +71,7 @@ class KilomboImport {
     if (const auto name = text("botName")) experiment.set_name(*name);
     if (const auto seed = number("randSeed")) {
       if (*seed >= 0)
-        experiment.set_seed(static_cast<std::uint64_t>(*seed));
+        experiment.set_seed(whole("randSeed", *seed, kLargestWhole));
       else
         note("randSeed", "was drawn by the clock; --seed chooses one here");
     }
@@ -76,7 +80,7 @@ class KilomboImport {
     if (duration_s <= 0) imported_.notes.emplace_back("simulationTime: has no end; 600 s were taken");
     const double robots = number("nBots").value_or(100);
     if (robots < 1) throw UserError(fmt::format("{}: nBots {:g}: expected at least 1", name_, robots));
-    layout(static_cast<std::uint32_t>(robots));
+    layout(static_cast<std::uint32_t>(whole("nBots", robots, std::numeric_limits<std::uint32_t>::max())));
     if (const auto range_mm = number("commsRadius")) experiment.mutable_radio()->set_range_mm(*range_mm);
     if (const auto share = number("msgSuccessRate"); share && *share < 1)
       experiment.mutable_radio()->set_loss(1 - *share);
@@ -110,6 +114,11 @@ class KilomboImport {
     read_[key] = true;
     if (!found->is_number()) throw UserError(fmt::format("{}: \"{}\": {} is no number", name_, key, found->dump()));
     return found->get<double>();
+  }
+  /// The whole part of a number that is not negative. Throws UserError beyond `most`.
+  [[nodiscard]] std::uint64_t whole(const std::string& key, double value, double most) const {
+    if (value > most) throw UserError(fmt::format("{}: {} {:g}: expected at most {:.0f}", name_, key, value, most));
+    return static_cast<std::uint64_t>(value);
   }
   std::optional<std::string> text(const std::string& key) {
     const auto found = parameters_.find(key);

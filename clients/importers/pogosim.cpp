@@ -4,13 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "clients/importers/imported.hpp"
 #include "core/base/error.hpp"
 #include "core/base/pose.hpp"
+#include "core/csv/csv_reader.hpp"
 
 namespace kilotwin::importers {
 namespace {
@@ -59,7 +63,8 @@ constexpr double kKilobot_mm = 16.5;
 
 class PogosimImport {
  public:
-  PogosimImport(std::string_view text, const std::string& name) : name_(name) {
+  PogosimImport(std::string_view text, const std::string& name, ReadNamed read)
+      : name_(name), read_file_(std::move(read)) {
     try {
       root_ = YAML::Load(std::string(text));
     } catch (const YAML::Exception& error) {
@@ -119,7 +124,7 @@ class PogosimImport {
   void top() {
     const double duration_s = number(root_, "simulation_time", read_).value_or(0);
     experiment().set_duration_s(duration_s > 0 ? duration_s : 600);
-    if (const auto seed = number(root_, "seed", read_); seed && *seed >= 0)
+    if (const auto seed = number(root_, "seed", read_); seed && *seed >= 0 && *seed <= 0x1p53)
       experiment().set_seed(static_cast<std::uint64_t>(*seed));
     if (const auto every_s = number(root_, "save_data_period", read_); every_s && *every_s > 0)
       experiment().mutable_recording()->set_every_s(*every_s);
@@ -198,13 +203,14 @@ class PogosimImport {
     }
     if (const auto speed_mm_s = number(object, "max_linear_speed", read))
       experiment().mutable_motion()->set_straight_speed_mm_s(*speed_mm_s);
-    layout(*group.mutable_layout());
+    layout(name, group);
     if (!program_told_)
       note(object, "the program's file is not named; it is taken to be behaviour.c, in C for kilolib");
     program_told_ = true;
   }
 
-  void layout(proto::Layout& layout) {
+  void layout(const std::string& category, proto::RobotGroup& group) {
+    proto::Layout& layout = *group.mutable_layout();
     const std::string formation = text(root_, "initial_formation", read_).value_or("power_lloyd");
     const double pitch_mm = number(root_, "chessboard_distance_between_neighbors", read_).value_or(50);
     const bool aligned = formation.starts_with("aligned_");
@@ -218,16 +224,7 @@ class PogosimImport {
       head(*layout.mutable_grid());
       return;
     }
-    if (formation == "imported") {
-      const std::string file = text(root_, "formation_filename", read_).value_or("poses.csv");
-      layout.mutable_poses()->set_csv("poses.csv");
-      note(root_["initial_formation"],
-           fmt::format(
-               "initial_formation: imported: make poses.csv of {}, with the columns x_mm,y_mm,heading_rad and "
-               "the origin in the arena's centre",
-               file));
-      return;
-    }
+    if (formation == "imported") return stated_poses(category, group);
     head(*layout.mutable_random());
     if (formation == "disk") {
       layout.mutable_random()->set_width_mm(std::round(half_mm_));
@@ -236,6 +233,81 @@ class PogosimImport {
     if (!formation_told_ && formation != "random" && formation != "aligned_random" && root_["initial_formation"])
       note(root_["initial_formation"], fmt::format("initial_formation: {}: became random", formation));
     formation_told_ = true;
+  }
+
+  /// The groups take the rows of the table `formation_filename` in their order.
+  void stated_poses(const std::string& category, proto::RobotGroup& group) {
+    const std::string file = text(root_, "formation_filename", read_).value_or("");
+    if (!formation_told_) read_formation(file);
+    formation_told_ = true;
+    PosesFile& poses = imported_.poses.emplace_back();
+    poses.name = fmt::format("poses-{}.csv", imported_.poses.size());
+    poses.text = "x_mm,y_mm,heading_deg\n";
+    group.mutable_layout()->mutable_poses()->set_csv(poses.name);
+    if (formation_.empty()) return imported_.poses.pop_back();  // a note says what to do
+    if (formation_.size() < next_pose_ + group.count())
+      throw UserError(fmt::format("{}: has {} poses, too few for the {} robots of {}{}", file, formation_.size(),
+                                  group.count(), category,
+                                  next_pose_ > 0 ? fmt::format(" after {} others", next_pose_) : ""));
+    for (std::uint32_t i = 0; i < group.count(); ++i) {
+      const Pose& pose = formation_[next_pose_++];
+      fmt::format_to(std::back_inserter(poses.text), "{:.10g},{:.10g},{:.6g}\n", pose.x_mm, pose.y_mm,
+                     pose.heading_rad * 180 / kPi);
+    }
+  }
+
+  /// Columns x, y, maybe theta or angle, and maybe time: then the rows of the earliest time count.
+  void read_formation(const std::string& file) {
+    const auto content = read_file_ && file.ends_with(".csv") ? read_file_(file) : std::nullopt;
+    if (!content) {
+      note(root_["initial_formation"], fmt::format("initial_formation: imported: \"{}\" is no CSV file that can be "
+                                                   "read; save it as CSV, and import again",
+                                                   file));
+      return;
+    }
+    CsvReader csv(file, *content);
+    csv.require({"x", "y"}, "the columns x and y, and maybe theta or angle, and time");
+    const auto heading = csv.find_column("theta") ? csv.find_column("theta") : csv.find_column("angle");
+    const auto time = csv.find_column("time");
+    const Scale x = scale("x", 0), y = scale("y", 1);
+    double earliest = std::numeric_limits<double>::infinity();
+    bool no_heading = !heading;
+    while (csv.next()) {
+      const double at_x = csv.number_or_nan(csv.column("x")), at_y = csv.number_or_nan(csv.column("y"));
+      const double at_s = time ? csv.number(*time) : 0;
+      if (std::isnan(at_x) || std::isnan(at_y) || at_s > earliest) continue;
+      if (at_s < earliest) formation_.clear();
+      earliest = at_s;
+      const double angle = heading ? csv.number_or_nan(*heading) : std::nan("");
+      no_heading = no_heading || std::isnan(angle);
+      formation_.push_back({x(at_x) - half_mm_, y(at_y) - half_mm_, std::isnan(angle) ? 0 : angle});
+    }
+    if (formation_.empty()) throw UserError(file + ": holds no pose");
+    if (no_heading)
+      note(root_["initial_formation"],
+           fmt::format("initial_formation: {} lacks angles, which are random there; they are 0 here", file));
+  }
+
+  /// The coordinates of a table of poses: as they are, or stretched from given bounds to those of the arena.
+  struct Scale {
+    double from = 0, by = 1;
+    double operator()(double value) const { return (value - from) * by; }
+  };
+  Scale scale(const char* axis, std::size_t index) {
+    const auto bound = [&](const char* key) -> double {
+      read_.insert(key);
+      const YAML::Node pair = root_[key];
+      double value = std::nan("");
+      if (pair && pair.IsSequence() && pair.size() == 2)
+        static_cast<void>(YAML::convert<double>::decode(pair[index], value));
+      return value;
+    };
+    const double low = bound("imported_formation_min_coords"), high = bound("imported_formation_max_coords");
+    if (!std::isfinite(low) || !std::isfinite(high)) return {};
+    if (high <= low)
+      throw UserError(fmt::format(
+          "{}: imported_formation_max_coords: {} is not above that of imported_formation_min_coords", name_, axis));
+    return {low, 2 * half_mm_ / (high - low)};
   }
 
   /// Millimetres from pogosim's corner to the arena's centre.
@@ -309,7 +381,14 @@ class PogosimImport {
     }
   }
 
+  struct Pose {
+    double x_mm = 0, y_mm = 0, heading_rad = 0;
+  };
+
   const std::string name_;
+  const ReadNamed read_file_;
+  std::vector<Pose> formation_;  ///< from the arena's centre
+  std::size_t next_pose_ = 0;    ///< the first that no group has
   YAML::Node root_;
   std::set<std::string> read_, told_;
   double area_mm2_ = 0, half_mm_ = 0;
@@ -320,9 +399,9 @@ class PogosimImport {
 
 }  // namespace
 
-Imported from_pogosim(std::string_view text, const std::string& name) {
+Imported from_pogosim(std::string_view text, const std::string& name, const ReadNamed& read) {
   try {
-    return PogosimImport(text, name).result();
+    return PogosimImport(text, name, read).result();
   } catch (const YAML::Exception& error) {
     throw UserError(fmt::format("{}:{}: {}", name, error.mark.line + 1, error.msg));
   }

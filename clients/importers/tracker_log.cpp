@@ -54,6 +54,11 @@ class LogImport {
     proto::Placement& placement = *door_.mutable_placement();
     width_mm_ = unit_mm * (lars_ ? kLarsWidth_px : kArkSide_px);
     height_mm_ = unit_mm * (lars_ ? kLarsHeight_px : kArkSide_px);
+    if (std::min(width_mm_, height_mm_) < 2 * kFromWall_mm)
+      throw UserError(fmt::format(
+          "{}: with --unit-mm {:g} the picture is {:g} by {:g} mm, smaller than a robot; give millimetres "
+          "per pixel",
+          one_line(file.string()), unit_mm, width_mm_, height_mm_));
     placement.set_unit_mm(unit_mm);
     placement.set_x_mm(-width_mm_ / 2);
     placement.set_y_mm(height_mm_ / 2);

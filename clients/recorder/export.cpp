@@ -142,6 +142,31 @@ std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path
                        });
 }
 
+std::uint64_t export_pogosim(Reader& recording, const std::filesystem::path& file, double every_s,
+                             const TableMetadata& metadata) {
+  const proto::RecordingHeader& header = recording.header();
+  const std::vector<std::uint32_t> groups = groups_of(header);
+  const auto category = [&](std::uint32_t group) {
+    return header.group_robots_size() < 2 ? std::string("robots") : fmt::format("robots-{}", group);
+  };
+  const double corner_x = header.arena_width_mm() / 2, corner_y = header.arena_height_mm() / 2;
+  const std::vector<Column> columns{{"time", "s", CellType::kTime},       {"robot_category", "", CellType::kText},
+                                    {"robot_id", "", CellType::kInteger}, {"x", "mm", CellType::kNumber, 4},
+                                    {"y", "mm", CellType::kNumber, 4},    {"angle", "rad", CellType::kNumber, 6}};
+  return export_states(recording, file, every_s, columns, metadata,
+                       [&](Table& table, const proto::StateRecord& state, Tick tick) {
+                         for (int i = 0; i < state.x_mm_size(); ++i) {
+                           table.time(tick, recording.tick_length());
+                           table.text(category(groups[static_cast<std::size_t>(i)]));
+                           table.integer(i);
+                           table.number(state.x_mm(i) + corner_x);
+                           table.number(state.y_mm(i) + corner_y);
+                           table.number(state.heading_rad(i));
+                           table.end_row();
+                         }
+                       });
+}
+
 std::uint64_t export_bodies(Reader& recording, const std::filesystem::path& file, double every_s,
                             const TableMetadata& metadata) {
   if (recording.header().movable_size() == 0) {

@@ -30,6 +30,12 @@ inline constexpr std::string_view kMessageColumns = "receiver,sender,count,sent_
 std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path& file, double every_s = 1,
                                   Poses which = Poses::kTrue, const TableMetadata& metadata = {});
 
+/// The columns of pogosim's own tables: time (s), robot_category ("robots", or "robots-GROUP" of several groups), robot_id, x, y (mm),
+/// angle (rad). Their origin is the corner of the arena's bounding box. Rows as of export_trajectories().
+inline constexpr std::string_view kPogosimColumns = "time,robot_category,robot_id,x,y,angle";
+std::uint64_t export_pogosim(Reader& recording, const std::filesystem::path& file, double every_s = 1,
+                             const TableMetadata& metadata = {});
+
 /// Columns time_s,body,x_mm,y_mm,heading_rad: the same for movable bodies; x, y is a body's centre. Throws UserError if the
 /// experiment has none.
 std::uint64_t export_bodies(Reader& recording, const std::filesystem::path& file, double every_s = 1,

@@ -48,7 +48,7 @@ class Octets {
 };
 
 struct Member {
-  std::string name;
+  std::string name, comment;
   std::uint64_t offset = 0, size = 0;
   std::uint32_t crc = 0;
 };
@@ -66,9 +66,9 @@ std::string directory(const std::vector<Member>& members, std::uint64_t offset, 
   for (const Member& member : members) {
     octets << kCentral << kVersion64 << kVersion64 << std::uint16_t{0} << std::uint16_t{0} << std::uint16_t{0}
            << kDate1980 << member.crc << kIn64 << kIn64 << static_cast<std::uint16_t>(member.name.size())
-           << std::uint16_t{28} << std::uint16_t{0} << std::uint16_t{0} << std::uint16_t{0} << std::uint32_t{0}
-           << kIn64 << member.name << std::uint16_t{1} << std::uint16_t{24} << member.size << member.size
-           << member.offset;
+           << std::uint16_t{28} << static_cast<std::uint16_t>(member.comment.size()) << std::uint16_t{0}
+           << std::uint16_t{0} << std::uint32_t{0} << kIn64 << member.name << std::uint16_t{1} << std::uint16_t{24}
+           << member.size << member.size << member.offset << member.comment;
   }
   const std::uint64_t size = octets.text().size(), count = members.size();
   octets << kEnd64 << std::uint64_t{44} << kVersion64 << kVersion64 << std::uint32_t{0} << std::uint32_t{0} << count
@@ -89,13 +89,27 @@ std::string array_header(const std::string& type, std::uint64_t rows) {
   return octets.text();
 }
 
+/// table_json() within the length of a comment: where that is too long, without the columns, which their members describe, and
+/// without as many of the longest texts as it takes.
+std::string fitting_json(const std::vector<Column>& columns, TableMetadata metadata) {
+  std::string json = table_json(columns, metadata);
+  if (json.size() > kMostComment) json = table_json({}, metadata);
+  while (json.size() > kMostComment) {
+    metadata.erase(std::max_element(metadata.begin(), metadata.end(), [](const auto& a, const auto& b) {
+      return a.second.size() < b.second.size();
+    }));
+    json = table_json({}, metadata);
+  }
+  return json;
+}
+
 }  // namespace
 
 NpzTable::NpzTable(std::filesystem::path file, std::vector<Column> columns, const TableMetadata& metadata)
     : Table(columns.size()),
       file_(std::move(file)),
       described_(std::move(columns)),
-      comment_(table_json(described_, metadata).substr(0, kMostComment)) {
+      comment_(fitting_json(described_, metadata)) {
   output_.reset(std::fopen(file_.c_str(), "wb"));
   if (!output_) fail();
   for (std::size_t i = 0; i < columns_; ++i) {
@@ -192,6 +206,7 @@ void NpzTable::close() {
   for (std::size_t i = 0; i < columns_; ++i) {
     Member& member = members.emplace_back();
     member.name = described_[i].name + ".npy";
+    member.comment = column_json(described_[i]);
     member.offset = written_;
     const std::string placeholder = local_header(member);
     append(placeholder.data(), placeholder.size());

@@ -1,5 +1,6 @@
 /// NpzTable: a Table as NumPy's .npz, an archive with one array per column. numpy.load() reads it; pandas.DataFrame(dict(...)) makes
-/// a data frame of it. The archive's comment is table_json().
+/// a data frame of it. Each array's comment is column_json(). The archive's comment is table_json(), without columns if it would be
+/// too long.
 #pragma once
 
 #include <cstdio>

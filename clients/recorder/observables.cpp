@@ -115,40 +115,73 @@ void ObservableObserver::add(double time_s, std::span<const double> x_mm, std::s
 
 namespace {
 
-/// `only`: a group; nothing: all robots.
-ObservableCurves observe_robots(Reader& recording, std::optional<std::uint32_t> only) {
-  // Robots of a group are neighbours in every column.
-  const std::vector<std::uint32_t> groups = groups_of(recording.header());
-  const auto [begin, end] =
-      only ? std::equal_range(groups.begin(), groups.end(), *only) : std::pair(groups.begin(), groups.end());
-  const auto first = static_cast<std::size_t>(begin - groups.begin()),
-             count = static_cast<std::size_t>(end - begin);
-  const auto column = [&](const auto& field) { return values(field).subspan(first, count); };
-  ObservableObserver observer;
-  SwarmObservables own(recording.header(), only);
-  std::vector<OwnCurve> curves;
-  for (const std::string& name : own.names()) curves.push_back({name, {}});
-  OrderedRecords ordered(recording, OrderedRecords::kStates | (own.any() ? OrderedRecords::kVariables : 0u));
-  while (ordered.next()) {
-    for (const proto::VariableRecord& variable : ordered.records().variables) own.take(variable);
-    if (!ordered.records().state) continue;
-    const proto::StateRecord& state = *ordered.records().state;
-    const double time_s = recording.tick_length().seconds_at(ordered.tick());
-    observer.add(time_s, column(state.x_mm()), column(state.y_mm()), column(state.heading_rad()),
-                 values(state.movable_x_mm()), values(state.movable_y_mm()));
-    if (!own.any()) continue;
-    const std::vector<double> at = own.values(time_s, state, observer.curves());
-    for (std::size_t i = 0; i < curves.size(); ++i) curves[i].value.push_back(at[i]);
+/// Observes all robots, or one group.
+class RobotsObserver {
+ public:
+  /// `only`: a group; nothing: all robots.
+  RobotsObserver(const proto::RecordingHeader& header, std::optional<std::uint32_t> only) : own_(header, only) {
+    // Robots of a group are neighbours in every column.
+    const std::vector<std::uint32_t> groups = groups_of(header);
+    const auto [begin, end] =
+        only ? std::equal_range(groups.begin(), groups.end(), *only) : std::pair(groups.begin(), groups.end());
+    first_ = static_cast<std::size_t>(begin - groups.begin());
+    count_ = static_cast<std::size_t>(end - begin);
+    for (const std::string& name : own_.names()) curves_.push_back({name, {}});
   }
-  ObservableCurves all = observer.curves();
-  all.own = std::move(curves);
-  return all;
+  [[nodiscard]] bool takes_variables() const { return own_.any(); }
+  void take(const proto::VariableRecord& variable) { own_.take(variable); }
+  void take(double time_s, const proto::StateRecord& state) {
+    const auto column = [&](const auto& field) { return values(field).subspan(first_, count_); };
+    observer_.add(time_s, column(state.x_mm()), column(state.y_mm()), column(state.heading_rad()),
+                  values(state.movable_x_mm()), values(state.movable_y_mm()));
+    if (!own_.any()) return;
+    const std::vector<double> at = own_.values(time_s, state, observer_.curves());
+    for (std::size_t i = 0; i < curves_.size(); ++i) curves_[i].value.push_back(at[i]);
+  }
+  [[nodiscard]] ObservableCurves curves() {
+    ObservableCurves all = observer_.curves();
+    all.own = std::move(curves_);
+    return all;
+  }
+
+ private:
+  std::size_t first_ = 0, count_ = 0;
+  ObservableObserver observer_;
+  SwarmObservables own_;
+  std::vector<OwnCurve> curves_;
+};
+
+/// Reads the recording once for all observers.
+std::vector<ObservableCurves> observe(Reader& recording, std::vector<RobotsObserver> observers) {
+  const bool variables = observers.front().takes_variables();
+  OrderedRecords ordered(recording, OrderedRecords::kStates | (variables ? OrderedRecords::kVariables : 0u));
+  while (ordered.next()) {
+    const double time_s = recording.tick_length().seconds_at(ordered.tick());
+    for (RobotsObserver& observer : observers) {
+      for (const proto::VariableRecord& variable : ordered.records().variables) observer.take(variable);
+      if (ordered.records().state) observer.take(time_s, *ordered.records().state);
+    }
+  }
+  std::vector<ObservableCurves> curves;
+  for (RobotsObserver& observer : observers) curves.push_back(observer.curves());
+  return curves;
 }
 
 }  // namespace
 
-ObservableCurves observe(Reader& recording) { return observe_robots(recording, std::nullopt); }
+ObservableCurves observe(Reader& recording) {
+  std::vector<RobotsObserver> all;
+  all.emplace_back(recording.header(), std::nullopt);
+  return std::move(observe(recording, std::move(all)).front());
+}
 
-ObservableCurves observe_group(Reader& recording, std::uint32_t group) { return observe_robots(recording, group); }
+std::vector<ObservableCurves> observe_with_groups(Reader& recording) {
+  std::vector<RobotsObserver> observers;
+  observers.emplace_back(recording.header(), std::nullopt);
+  const int groups = std::max(1, recording.header().group_robots_size());
+  for (int group = 0; group < groups; ++group)
+    observers.emplace_back(recording.header(), static_cast<std::uint32_t>(group));
+  return observe(recording, std::move(observers));
+}
 
 }  // namespace kilotwin::recorder

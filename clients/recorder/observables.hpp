@@ -71,8 +71,8 @@ class ObservableObserver {
 /// Observables of all remaining states of a recording, those of the experiment included. Throws UserError where the recording holds an
 /// expression that cannot be read.
 [[nodiscard]] ObservableCurves observe(Reader& recording);
-/// The same of one group of robots, as if the swarm were that group. Movable bodies stay as they are.
-[[nodiscard]] ObservableCurves observe_group(Reader& recording, std::uint32_t group);
+/// The same, followed by those of each group of robots as if the swarm were that group. Movable bodies stay as they are.
+[[nodiscard]] std::vector<ObservableCurves> observe_with_groups(Reader& recording);
 
 /// Mean over robots of the distance to their nearest neighbour; NaN for fewer than two robots.
 [[nodiscard]] double mean_nearest_distance_mm(std::span<const double> x_mm, std::span<const double> y_mm);

@@ -10,6 +10,18 @@
 #include "core/base/error.hpp"
 
 namespace kilotwin::recorder {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json described(const Column& column) {
+  const char* const type = column.type == CellType::kInteger ? "integer"
+                           : column.type == CellType::kText  ? "text"
+                                                             : "number";
+  return {{"name", column.name}, {"unit", column.unit}, {"type", type}};
+}
+
+}  // namespace
 
 std::unique_ptr<Table> open_table(const std::filesystem::path& file, std::vector<Column> columns,
                                   const TableMetadata& metadata) {
@@ -26,17 +38,16 @@ std::unique_ptr<Table> open_table(const std::filesystem::path& file, std::vector
   return std::make_unique<CsvTable>(file, std::move(columns), metadata);
 }
 
+std::string column_json(const Column& column) {
+  return described(column).dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+}
+
 std::string table_json(const std::vector<Column>& columns, const TableMetadata& metadata) {
-  nlohmann::ordered_json json;
+  ordered_json json;
   for (const auto& [name, value] : metadata) json[name] = value;
-  nlohmann::ordered_json& list = json["columns"] = nlohmann::ordered_json::array();
-  for (const Column& column : columns) {
-    const char* const type = column.type == CellType::kInteger ? "integer"
-                             : column.type == CellType::kText  ? "text"
-                                                               : "number";
-    list.push_back({{"name", column.name}, {"unit", column.unit}, {"type", type}});
-  }
-  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  ordered_json& list = json["columns"] = ordered_json::array();
+  for (const Column& column : columns) list.push_back(described(column));
+  return json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
 }
 
 std::string exact_seconds(Tick tick, TickLength length) {

@@ -67,6 +67,9 @@ class Table {
 [[nodiscard]] std::unique_ptr<Table> open_table(const std::filesystem::path& file, std::vector<Column> columns,
                                                 const TableMetadata& metadata);
 
+/// A column as JSON in one line: {"name", "unit", "type"}.
+[[nodiscard]] std::string column_json(const Column& column);
+
 /// Columns and metadata as JSON: {"columns": [{"name", "unit", "type"}...], NAME: VALUE...}.
 [[nodiscard]] std::string table_json(const std::vector<Column>& columns, const TableMetadata& metadata);
 

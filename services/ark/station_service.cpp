@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "core/base/error.hpp"
+#include "core/federation/checkpoint.hpp"
 #include "core/federation/frame_io.hpp"
 #include "core/federation/pace.hpp"
 #include "core/federation/snapshots.hpp"
@@ -108,6 +109,7 @@ class StationFederate : public Federate {
   void idle() override {
     announce(session_.now());
     settle();
+    await_parts();
     const RunProgress progress = this->progress();
     observer_.idle(progress);
     if (progress.paused) {
@@ -154,6 +156,7 @@ class StationFederate : public Federate {
     status.sent = progress.sent;
     status.received = progress.received;
     progress.waiting_for.copy(status.note, sizeof status.note - 1);
+    status.saved_tick = saved_.count();
     status_.write(status);
   }
   /// The run has come to its end in order.
@@ -194,7 +197,16 @@ class StationFederate : public Federate {
     part.mutable_station()->set_hash_chain(metrics_.chain());
     observer_.saved();
     write_checkpoint_part(context_.run_directory, session_.plan(), tick, session_.plan().station(), part);
+    written_ = tick;
     unfinished_.pop_front();
+  }
+
+  /// Finds that the checkpoint whose part the station wrote last is complete. Where federates have disks of their own, it is once
+  /// all have stepped beyond it: each saves a tick before it leaves it.
+  void await_parts() {
+    if (written_ == saved_) return;
+    if (metrics_.hash_tick() > written_ || is_complete(checkpoint_directory(context_.run_directory, written_)))
+      saved_ = written_;
   }
 
   void announce(Tick now) {
@@ -274,6 +286,7 @@ class StationFederate : public Federate {
   Pace pace_{session_.plan()};
   Lateness lateness_{session_.plan()};
   std::deque<std::pair<Tick, proto::CheckpointPart>> unfinished_;  // without their state hash
+  Tick written_{0}, saved_{0};  // of the last checkpoint: the station's part of it; all parts
   std::uint64_t recording_ns_ = 0;
   bool stop_announced_ = false;
 };

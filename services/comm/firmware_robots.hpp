@@ -2,6 +2,7 @@
 /// services/comm/firmware.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -65,5 +66,11 @@ class FirmwareRobots {
   /// Restores the result of save(). Throws RunError if it does not fit.
   virtual void load(std::uint32_t i, const std::string& octets) = 0;
 };
+
+/// The index of a firmware robot.
+[[nodiscard]] inline std::uint32_t index_of(std::uint32_t robot, const FirmwareRobots& robots) {
+  const auto ids = robots.ids();
+  return static_cast<std::uint32_t>(std::lower_bound(ids.begin(), ids.end(), robot) - ids.begin());
+}
 
 }  // namespace kilotwin::comm

@@ -1,7 +1,5 @@
 #include "services/comm/radio_observer.hpp"
 
-#include <algorithm>
-
 #include "idl/recording.pb.h"
 
 namespace kilotwin::comm {
@@ -9,11 +7,6 @@ namespace {
 
 /// Where avr-gcc's debug information puts RAM.
 constexpr std::uint64_t kRamInDebugInformation = 0x800000, kRamEnd = 0x900;
-
-std::uint32_t index_of(std::uint32_t robot, const FirmwareRobots& robots) {
-  const auto ids = robots.ids();
-  return static_cast<std::uint32_t>(std::lower_bound(ids.begin(), ids.end(), robot) - ids.begin());
-}
 
 class FirmwareMemory final : public ProgramMemory {
  public:

@@ -1,6 +1,8 @@
 """The package against the program: PROGRAM SOURCES are the arguments."""
 
+import importlib.util
 import os
+import shutil
 import socket
 import subprocess
 import sys
@@ -46,6 +48,17 @@ OBEYING = """
 duration_s: 6 seed: 4
 arena { width_mm: 500 height_mm: 500 }
 robots { count: 5 behaviour: "obeys.c" layout { grid { pitch_mm: 60 } } }
+"""
+
+
+ENDS_THE_RUN = """
+#include <kilotwin_station.hpp>
+#include <cstdlib>
+struct Bad : KilobotExperiment {
+  void initialise(bool) override {}
+  void run() override { abort(); }
+};
+extern "C" KilobotExperiment* createExpt() { return new Bad; }
 """
 
 
@@ -107,6 +120,20 @@ class Package(unittest.TestCase):
         self.assertEqual(len(done.runs()), 4)
         self.assertEqual(len(done.table("sweep")), 2)
 
+    def test_a_sweep_is_read_from_any_folder(self):
+        words = ["sweep", str(EXPERIMENT), "--robots", "4", "--duration", "1", "--out", "sweep"]
+        subprocess.run([PROGRAM, *words], cwd=self.out, check=True, capture_output=True)
+        self.assertEqual([run.summary["robots"] for run in kilotwin.Sweep(self.out / "sweep").runs()], [4])
+
+    def test_a_sweep_of_failures_is_an_exception_and_runs_once(self):
+        (self.out / "obeys.c").write_text(OBEYS)
+        (self.out / "bad.cpp").write_text(ENDS_THE_RUN)
+        plugin = 'station { environment { plugin { source: "bad.cpp" on_failure: END_RUN } } }'
+        (self.out / "e.txtpb").write_text(OBEYING + plugin)
+        with self.assertRaisesRegex(kilotwin.KilotwinError, "no run came to its end: .*bad.cpp failed"):
+            kilotwin.sweep(self.out / "e.txtpb", out=self.out / "sweep", seeds="1..2")
+        self.assertEqual(len(kilotwin.Sweep(self.out / "sweep").table()), 2)
+
     def test_errors_are_exceptions(self):
         with self.assertRaisesRegex(kilotwin.KilotwinError, "cannot be read|no such|does not exist") as raised:
             kilotwin.run(self.out / "none.txtpb")
@@ -167,6 +194,11 @@ class Package(unittest.TestCase):
             for name, value in [("gain", 256), ("gain", -1), ("gain", 0.5), ("table[0]", 128), ("gain", np.inf)]:
                 with self.assertRaisesRegex(kilotwin.KilotwinError, "cannot hold"):
                     arena.set_variable(name, value)
+            # A value that one robot refuses changes no robot.
+            with self.assertRaisesRegex(kilotwin.KilotwinError, "robot 4: gain cannot hold 256"):
+                arena.set_variable("gain", [1, 2, 3, 4, 256])
+            arena.step(1)
+            np.testing.assert_array_equal(arena.variable("gain"), [10, 11, 12, 7, 255])
             with self.assertRaisesRegex(KeyError, "there are: gain"):
                 arena.variable("gains")
             # Whoever hears the station shows it, from the next ticks on.
@@ -205,6 +237,11 @@ class Package(unittest.TestCase):
                 ended_at = live.step(60)["tick"]
                 self.assertEqual(ended_at, paused_at + 60)
                 self.assertEqual(live.state()["x_mm"].shape, (12,))
+                # The state of a paused run is never older than the answer before it.
+                for _ in range(5):
+                    ended_at = live.step(3)["tick"]
+                    self.assertEqual(live.state()["tick"], ended_at)
+                self.assertGreaterEqual(live.checkpoint()["saved_tick"], ended_at)
                 self.assertEqual(live.stop()["phase"], "ended")
             self.assertEqual(run.wait(30), 0)
         finally:
@@ -246,6 +283,12 @@ class Package(unittest.TestCase):
         self.assertAlmostEqual(local.summary["observables"]["volts"], volts["battery_V"][-1], places=6)
         federated = kilotwin.run(self.out / "e.txtpb", mode="federated", out=self.out / "federated")
         np.testing.assert_array_equal(federated.variables()["battery_V"], volts["battery_V"])
+        # A caller's arena shows them too, also those of robots that run firmware.
+        for avr in ["", " avr: true"] if shutil.which("avr-gcc") else [""]:
+            (self.out / "arena.txtpb").write_text(text.replace("count: 2", "count: 2" + avr))
+            with kilotwin.Arena(self.out / "arena.txtpb", variables=["battery_V"]) as arena:
+                arena.step(seconds=10)
+                np.testing.assert_allclose(arena.variable("battery_V"), 3.70 + 0.08 * 0.1 / 0.2 - 0.036, atol=5e-3)
         (self.out / "wrong.txtpb").write_text(text.replace('"battery_V" every', '"battery" every'))
         with self.assertRaisesRegex(kilotwin.KilotwinError, "is battery_V"):
             kilotwin.run(self.out / "wrong.txtpb", out=self.out / "wrong")
@@ -274,6 +317,19 @@ class Package(unittest.TestCase):
         self.assertEqual(refused.returncode, 2)
         self.assertIn("is not swept", refused.stderr)
         self.assertFalse((self.out / "no").exists())
+
+    def test_it_installs_without_a_network(self):
+        if importlib.util.find_spec("ensurepip") is None or importlib.util.find_spec("setuptools") is None:
+            self.skipTest("python3-venv or python3-setuptools is not installed")
+        # A build leaves files beside its sources.
+        shutil.copytree(SOURCES / "python", self.out / "python")
+        subprocess.run([sys.executable, "-m", "venv", "--system-site-packages", self.out / "venv"], check=True)
+        python = self.out / "venv/bin/python"
+        words = ["-m", "pip", "install", "--quiet", "--no-index", "--no-build-isolation", self.out / "python"]
+        subprocess.run([python, *words], check=True)
+        seen = subprocess.check_output([python, "-c", "import kilotwin; print(kilotwin.__file__, kilotwin.program())"], text=True)
+        self.assertEqual(seen.split()[1], PROGRAM)
+        self.assertTrue(seen.startswith(str(self.out / "venv")), seen)
 
     def test_errors_of_arenas_are_exceptions(self):
         with self.assertRaisesRegex(kilotwin.KilotwinError, "none.txtpb") as raised:

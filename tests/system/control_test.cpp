@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "clients/recorder/reader.hpp"
+#include "core/federation/checkpoint.hpp"
 #include "core/federation/topics.hpp"
 #include "tests/system/program.hpp"
 
@@ -123,8 +124,16 @@ TEST_F(Control, TheCommandSteersARun) {
   const auto stepped = control({"step", "7"});
   EXPECT_EQ(stepped.at("tick").get<int>(), paused.at("tick").get<int>() + 7);
   EXPECT_EQ(stepped.at("phase"), "paused");
-  control({"checkpoint"});
-  EXPECT_EQ(control({"continue"}).at("phase"), "running");
+  // Each command returns when its effect is there: a paused run saves where it stands.
+  const auto saved_at = [&](const nlohmann::json& status) {
+    const Tick tick{status.at("saved_tick").get<std::int64_t>()};
+    EXPECT_TRUE(is_complete(checkpoint_directory(scratch_.path() / "run", tick))) << tick.count();
+    return tick.count();
+  };
+  EXPECT_EQ(saved_at(control({"checkpoint"})), stepped.at("tick").get<std::int64_t>());
+  const auto running = control({"continue"});
+  EXPECT_EQ(running.at("phase"), "running");
+  EXPECT_GT(saved_at(control({"checkpoint"})), running.at("tick").get<std::int64_t>());
   EXPECT_EQ(control({"status"}).at("robots"), 20);
   EXPECT_EQ(control({"stop"}).at("phase"), "ended");
   const Outcome outcome = process_->wait(30);

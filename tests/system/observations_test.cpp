@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -128,8 +129,13 @@ TEST_F(Observations, EventsAgreeWithCountsAndLayout) {
     ++count[row.at("event")];
     EXPECT_GE(std::stod(row.at("time_s")), last);
     last = std::stod(row.at("time_s"));
-    if (row.at("event") == "received") {
-      EXPECT_GT(std::stod(row.at("distance_mm")), 30);
+    if (row.at("event") != "received") continue;
+    EXPECT_NE(row.at("robot"), row.at("sender"));
+    // Until the robots drive they stand on their grid of three columns.
+    const int robot = std::stoi(row.at("robot")), sender = std::stoi(row.at("sender"));
+    const double apart_mm = 50 * std::hypot(robot % 3 - sender % 3, robot / 3 - sender / 3);
+    if (last < 1.2) {
+      EXPECT_NEAR(std::stod(row.at("distance_mm")), apart_mm, 0.01) << robot << " from " << sender;
     }
   }
   EXPECT_EQ(count["sent"], summary.messages.sent);
@@ -143,6 +149,42 @@ TEST_F(Observations, EventsAgreeWithCountsAndLayout) {
   }
   EXPECT_EQ(motions, (std::vector<std::string>{"stop", "straight", "left"}));
   EXPECT_EQ(commands.at(0).at("run"), "observed-1");
+}
+
+TEST_F(Observations, TheStationsPacketsAndLogsAndLifeCyclesAreExported) {
+  write(scratch_.path() / "hub.txtpb",
+        "name: \"hub\" duration_s: 3 arena { width_mm: 600 height_mm: 600 } robots { count: 4 behaviour: \"" +
+            source("behaviours/ark_hub.c") +
+            "\" layout { grid { pitch_mm: 100 } } } station { environment { hub { } } } recording { event: STATION "
+            "event: STATE }");
+  run({scratch_ / "hub.txtpb", "--mode", "local"}, scratch_, "hub");
+  int packets = 0;
+  std::map<std::string, std::vector<std::string>> life;
+  for (const auto& row : table_of(exported("hub", "--events"))) {
+    if (row.at("event") == "state") life[row.at("robot")].push_back(row.at("state"));
+    if (row.at("event") != "station") continue;
+    EXPECT_EQ(row.at("text").size(), 20u) << "ten octets";
+    packets += row.at("text") != std::string(20, '0');
+  }
+  // Beside those for robots, one starts them.
+  const auto station = nlohmann::json::parse(read(scratch_.path() / "hub/summary.json")).at("station");
+  EXPECT_EQ(packets, station.at("packets").get<int>() + 1);
+  EXPECT_EQ(life.size(), 4u);
+  for (const auto& [robot, states] : life)
+    EXPECT_EQ(states, (std::vector<std::string>{"idle", "running"})) << robot;
+
+  // The hub's log has the robots at its begin.
+  const Table logs = table_of(exported("hub", "--environment")),
+              poses = table_of(exported("hub", "--trajectories"));
+  ASSERT_GE(logs.size(), 4u);
+  for (std::size_t robot = 0; robot < 4; ++robot) {
+    EXPECT_EQ(logs[robot].at("name"), "hub");
+    EXPECT_EQ(logs[robot].at("robot"), std::to_string(robot));
+    EXPECT_NEAR(std::stod(logs[robot].at("x")), std::stod(poses[robot].at("x_mm")), 1e-3);
+    EXPECT_NEAR(std::stod(logs[robot].at("y")), std::stod(poses[robot].at("y_mm")), 1e-3);
+    EXPECT_NEAR(std::stod(logs[robot].at("orientation_deg")) * M_PI / 180,
+                std::stod(poses[robot].at("heading_rad")), 1e-4);
+  }
 }
 
 TEST_F(Observations, AFederatedRunRecordsTheSame) {

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # usage: slurm_test.sh KILOTWIN SOURCES
-# A sweep on a real Slurm of one node, whose daemons are this script's own. The node fails while elements of the array run. The sweep
-# must end with the rows of the same sweep without Slurm. Status 77: there is no Slurm, or this is not root, which slurmd needs.
+# A sweep of 100 runs on a real Slurm of one node, whose daemons are this script's own. squeue fails for a while, the node fails while
+# elements of the array run, and the sweep's own process is killed while its job goes on. In the end there must be the rows of the
+# same sweep without Slurm. Status 77: there is no Slurm, or this is not root, which slurmd needs.
 set -euo pipefail
 program=$1 sources=$2
 
@@ -75,11 +76,52 @@ until sinfo -h -o %T 2> /dev/null | grep -q idle; do
 done
 
 cd "$sources"
-sweep=("$program" sweep experiments/disperse.txtpb --robots 20 --duration 20 --seeds 1..24)
-"${sweep[@]}" --slurm --out "$scratch/sweep" > "$scratch/sweep.log" 2>&1 &
-of_sweep=$!
+readonly runs=100
+experiment=(experiments/disperse.txtpb --robots 4 --duration 2 --seeds 1..25 --set robots.layout.grid.pitch_mm=40..46:2)
+of_sweep=0
+# Starts the sweep with these arguments, and with an squeue that fails twice before it answers.
+start() {
+  mkdir -p "$scratch/flaky"
+  echo 2 > "$scratch/flaky/left"
+  cat > "$scratch/flaky/squeue" << END
+#!/usr/bin/env bash
+left=\$(cat "$scratch/flaky/left")
+echo "\$((left - 1))" > "$scratch/flaky/left"
+if [ "\$left" -gt 0 ]; then echo "slurm_load_jobs error: Unable to contact slurm controller" >&2; exit 1; fi
+exec "$(command -v squeue)" "\$@"
+END
+  chmod +x "$scratch/flaky/squeue"
+  PATH="$scratch/flaky:$PATH" "$program" sweep "${experiment[@]}" --slurm "$@" > "$scratch/sweep.log" 2>&1 &
+  of_sweep=$!
+}
+fail() {
+  echo "FAILED: $1"
+  cat "$scratch"/*.log
+  exit 1
+}
 done_runs() { find "$scratch/sweep" -name summary.json 2> /dev/null | wc -l; }
-until [ "$(done_runs)" -ge 5 ] || ! kill -0 "$of_sweep" 2> /dev/null; do sleep 0.1; done
+# Waits for that many runs, or the end of the sweep.
+await_runs() {
+  until [ "$(done_runs)" -ge "$1" ]; do
+    kill -0 "$of_sweep" 2> /dev/null || fail "the sweep ended after $(done_runs) runs"
+    sleep 0.1
+  done
+}
+start --out "$scratch/sweep"
+await_runs 5
+grep -q "squeue fails: slurm_load_jobs error" "$scratch/sweep.log" || fail "a squeue that fails is not reported"
+# The process that waits is killed, as where somebody logs out. Its job goes on.
+kill -KILL "$of_sweep"
+{ wait "$of_sweep" || true; } 2> /dev/null
+status=0
+"$program" sweep "${experiment[@]}" --resume "$scratch/sweep" > "$scratch/refused.log" 2>&1 || status=$?
+[ "$status" = 2 ] || fail "it resumed beside its own job"
+grep -q "still in the queue" "$scratch/refused.log" || fail "it does not say why it does not resume"
+scancel "$(cat "$scratch/sweep/slurm-job")"
+until [ -z "$(squeue --noheader)" ]; do sleep 0.2; done
+
+start --resume "$scratch/sweep"
+await_runs $(($(done_runs) + 5))
 before=$(done_runs)
 # The node's power fails: its daemon ends, and all that it had started.
 kill -KILL "$(cat "$scratch/slurmd.pid")"
@@ -90,31 +132,31 @@ for process in $(pgrep -f "$scratch/sweep/" || true) $(pgrep -f "slurmstepd.*" |
 done
 sleep 1
 slurmd
-echo "the node failed after $before of 24 runs"
+echo "the node failed after $before of $runs runs"
 
 status=0
 wait "$of_sweep" || status=$?
 if [ "$status" = 1 ]; then
   echo "lost elements are submitted again"
-  "$program" sweep --resume "$scratch/sweep" --slurm > "$scratch/resumed.log" 2>&1 || { cat "$scratch/resumed.log"; exit 1; }
+  "$program" sweep "${experiment[@]}" --slurm --resume "$scratch/sweep" > "$scratch/resumed.log" 2>&1 || fail "it cannot be resumed"
 elif [ "$status" != 0 ]; then
-  cat "$scratch/sweep.log"
-  exit 1
+  fail "status $status"
 fi
-"${sweep[@]}" --out "$scratch/plain" > /dev/null 2>&1
-python3 - "$scratch/sweep/runs.csv" "$scratch/plain/runs.csv" << 'END'
+[ ! -e "$scratch/sweep/slurm-job" ] || fail "the job's id stays after its end"
+"$program" sweep "${experiment[@]}" --out "$scratch/plain" > /dev/null 2>&1
+python3 - "$scratch/sweep/runs.csv" "$scratch/plain/runs.csv" "$runs" << 'END'
 import csv
 import sys
 
 # What depends on the machine, or on where the results lie, may differ.
 DIFFERS = {"directory", "wall_s", "start_s", "cpu_s", "peak_memory_mib", "run", "speed"}
-tables = [[{k: v for k, v in row.items() if k not in DIFFERS} for row in csv.DictReader(open(name))] for name in sys.argv[1:]]
-if len(tables[0]) != 24 or tables[0] != tables[1]:
+tables = [[{k: v for k, v in row.items() if k not in DIFFERS} for row in csv.DictReader(open(name))] for name in sys.argv[1:3]]
+if len(tables[0]) != int(sys.argv[3]) or tables[0] != tables[1]:
     print(f"FAILED: {len(tables[0])} rows by Slurm, {len(tables[1])} without")
     for one, other in zip(*tables):
         if one != other:
             print({k: (one[k], other[k]) for k in one if one[k] != other[k]})
             break
     sys.exit(1)
-print("24 rows, as without Slurm")
+print(f"{len(tables[0])} rows, as without Slurm")
 END

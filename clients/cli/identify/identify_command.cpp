@@ -20,6 +20,7 @@
 #include "clients/identify/report/report.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
+#include "core/experiment/clamp.hpp"
 #include "core/os/files.hpp"
 
 namespace kilotwin::cli {
@@ -30,7 +31,7 @@ struct IdentifyArguments {
   fs::path train, test;
   Output output;
   double horizon_s = 10;
-  std::uint32_t threads = 2;
+  std::uint32_t threads = 2, draws = 0;
   bool quiet = false;
 };
 
@@ -145,6 +146,20 @@ void print_results(const IdentifyArguments& arguments, const identify::Identifie
     fmt::print("next: {}\n", next->get<std::string>());
 }
 
+/// Draws as files that runs take: model-01.txtpb and so on.
+void write_draws(std::vector<proto::Model> draws, const fs::path& train, const fs::path& directory) {
+  if (draws.empty()) return;
+  fs::create_directory(directory);
+  const std::size_t digits = std::max<std::size_t>(2, std::to_string(draws.size()).size());
+  for (std::size_t n = 0; n < draws.size(); ++n) {
+    clamp_to_ranges(draws[n]);
+    const std::string remark = fmt::format("Draw {} of {} from the posterior of the model identified from {}.",
+                                           n + 1, draws.size(), train.string());
+    os::write_file(directory / fmt::format("model-{:0{}}.txtpb", n + 1, digits),
+                   identify::text_of(draws[n], remark));
+  }
+}
+
 int identify_data(const IdentifyArguments& arguments) {
   if (!(arguments.horizon_s > 0)) throw UserError("--horizon: give a number of seconds above 0");
   warn_beyond_cores("--threads", arguments.threads);
@@ -156,6 +171,7 @@ int identify_data(const IdentifyArguments& arguments) {
   identify::Options options;
   options.horizon_s = arguments.horizon_s;
   options.threads = arguments.threads;
+  options.draws = arguments.draws;
   options.model_file = (out / "model.txtpb").string();
   std::optional<Progress> progress(std::in_place, !arguments.quiet);
   // Reading takes the first 2 %, drawing the last 3 %.
@@ -175,6 +191,7 @@ int identify_data(const IdentifyArguments& arguments) {
   progress->show(0.97, "drawing the report", "drawing");
   os::write_file(options.model_file,
                  identify::text_of(found.model, fmt::format("Identified from {}.", arguments.train.string())));
+  write_draws(found.draws, arguments.train, out / "draws");
   os::write_file(out / "result.json", found.document.at("contract").dump(2) + "\n");
   os::write_file(out / "predictions.csv", csv_of(found.predictions));
   identify::write_report(found.document, out / "report.html");
@@ -204,6 +221,13 @@ Command add_identify(CLI::App& program) {
       ->type_name("SECONDS");
   app.add_option("--threads", arguments->threads, "threads to work on")
       ->check(CLI::Range(1, 256).description(""))
+      ->capture_default_str()
+      ->type_name("N");
+  app.add_option(
+         "--draws", arguments->draws,
+         "as many models from the posterior, as OUT/draws/model-01.txtpb and so on: for the options --models of "
+         "sweep and tune")
+      ->check(CLI::Range(0, 1000).description(""))
       ->capture_default_str()
       ->type_name("N");
   app.add_flag("--quiet", arguments->quiet, "no progress and no summary on the screen");

@@ -84,6 +84,10 @@ std::optional<identify::Identified> identify_other_data(const fs::path& train, c
                                                         const fs::path& out, const identify::Options& options) {
   // The columns of a recording include those of a Kilogrid run.
   if (identify::has_trajectories(train) || !identify::importable(train).empty()) return std::nullopt;
+  if (options.draws > 0)
+    throw UserError(fmt::format(
+        "--draws: models are drawn from the posterior of a fit to trajectories, and {} holds other data",
+        train.string()));
   const auto same_kind = [&](bool is, const char* kind) {
     if (!test.empty() && !is)
       throw UserError(

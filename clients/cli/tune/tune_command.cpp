@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "clients/cli/commands.hpp"
+#include "clients/cli/model_files.hpp"
 #include "clients/cli/observable_choice.hpp"
 #include "clients/cli/prepare.hpp"
 #include "clients/cli/progress.hpp"
@@ -70,7 +71,8 @@ std::string checked_name(const Measurement& measurement, const Goal& goal, std::
   return name;
 }
 
-int tune_experiment(const TuneArguments& arguments) {
+int tune_experiment(TuneArguments arguments) {
+  arguments.models = model_files("--models", arguments.models);
   const std::uint32_t cores = os::cores();
   warn_beyond_cores("--jobs", arguments.jobs);
   TuneResult result;
@@ -172,9 +174,11 @@ Command add_tune(CLI::App& program) {
       ->capture_default_str()
       ->type_name("N");
   CLI::Option* const models =
-      app.add_option("--models", arguments->models,
-                     "model files; each point runs with all of them, so that the best survives what is uncertain")
-          ->type_name("FILE...");
+      app.add_option(
+             "--models", arguments->models,
+             "model files, or directories of them; each point runs with all, so that the best survives what is "
+             "uncertain")
+          ->type_name("DIR|FILE...");
   models->excludes(app.get_option("--model"));
   app.add_flag("--worst", arguments->worst, "of several models, the worst counts and not the mean")->needs(models);
   app.add_option("--jobs", arguments->jobs, "runs at a time (default: one per core)")->type_name("N");

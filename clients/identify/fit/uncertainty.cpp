@@ -64,6 +64,7 @@ Uncertainty uncertainty_of(const Fitter& fitter, const FitState& state) {
     const Eigen::Matrix2d own = sums.precision.inverse();
     const Eigen::MatrixXd by = own * sums.by_column;
     out.biases[robot] = own + by * out.covariance * by.transpose();
+    out.given[robot] = {own, -by};
   }
   return out;
 }

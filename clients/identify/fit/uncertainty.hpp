@@ -8,11 +8,18 @@
 
 namespace kilotwin::identify {
 
+/// The posterior of a robot's biases where base parameters and coefficients are known.
+struct GivenBiases {
+  Eigen::Matrix2d covariance;
+  Eigen::MatrixXd by_column;  ///< by how much the mean moves with each base parameter and coefficient; 2 x columns
+};
+
 struct Uncertainty {
   /// Of the base parameters (BaseColumn), then of the coefficients of all terms in order.
   Eigen::MatrixXd covariance;
   /// Of the biases of each robot, with that of the base parameters and coefficients.
   std::map<std::uint32_t, Eigen::Matrix2d> biases;
+  std::map<std::uint32_t, GivenBiases> given;
 
   [[nodiscard]] double sd(Eigen::Index column) const {
     return std::sqrt(std::max(0.0, covariance(column, column)));

@@ -28,6 +28,11 @@ class Identification:
         return self.directory / "model.txtpb"
 
     @property
+    def draws(self) -> list[Path]:
+        """Models from the posterior, for `models` of sweep() and tune()."""
+        return sorted((self.directory / "draws").glob("*.txtpb"))
+
+    @property
     def report(self) -> Path:
         """The page with the result."""
         return self.directory / "report.html"
@@ -60,18 +65,20 @@ def identify(
     *,
     out: str | os.PathLike[str],
     horizon_s: float | None = None,
+    draws: int | None = None,
     threads: int | None = None,
     force: bool = False,
 ) -> Identification:
     """Fits the model to the tracks in the directory `train`, and finds effects that it lacks.
 
     test: tracks to be predicted, never fitted to; None: a part of `train` is held out. horizon_s: how far ahead predictions look.
+    draws: as many models from the posterior, in the directory `draws` of the result.
     Takes up to some minutes. Raises KilotwinError for wrong input.
     """
     words = ["identify", "--train", os.fspath(train), "--out", os.fspath(out), "--quiet"]
     if test is not None:
         words += ["--test", os.fspath(test)]
-    for option, value in [("--horizon", horizon_s), ("--threads", threads)]:
+    for option, value in [("--horizon", horizon_s), ("--draws", draws), ("--threads", threads)]:
         if value is not None:
             words += [option, str(value)]
     if force:

@@ -53,11 +53,11 @@ class Live:
 
     def status(self) -> dict[str, Any]:
         """run, name, phase (starting, running, paused, ended, broken), tick, last_tick, simulated_s, wall_s, robots, robots_failed,
-        sent, received, note."""
+        sent, received, note, saved_tick (of the last checkpoint; 0: none)."""
         return self._ask({"status": None})
 
     def state(self) -> dict[str, Any]:
-        """The newest state that has come, some 10 a second: tick, time_s; per robot x_mm, y_mm, heading_rad, led (robots, 3), life_cycle;
+        """The newest state that has come, some 10 a second; of a paused run, the state in which it stands: tick, time_s; per robot x_mm, y_mm, heading_rad, led (robots, 3), life_cycle;
         per movable body body_x_mm, body_y_mm, body_heading_rad. All but the first two are arrays."""
         state = self._ask({"state": None})
         return {name: np.asarray(value) if isinstance(value, list) else value for name, value in state.items()}
@@ -75,7 +75,7 @@ class Live:
         return self._ask({"step": int(ticks)})
 
     def checkpoint(self) -> dict[str, Any]:
-        """Saves the state, so that `kilotwin run --resume` can go on from it."""
+        """Saves the state, so that `kilotwin run --resume` can go on from it. Returns when it has been saved."""
         return self._ask({"checkpoint": None})
 
     def stop(self) -> dict[str, Any]:

@@ -25,13 +25,24 @@ def program() -> str:
     return found
 
 
-def call(words: Sequence[str], accepted: Sequence[int] = (0,)) -> str:
-    """Runs the program and returns its standard output. Raises KilotwinError for other statuses than those accepted."""
+def ended(words: Sequence[str]) -> tuple[int, str, str]:
+    """Runs the program to its end and returns its status, standard output and standard error."""
     done = subprocess.run([program(), *words], capture_output=True, text=True, check=False)
-    if done.returncode not in accepted:
-        lines = [line for line in done.stderr.splitlines() if line.strip()]
-        raise KilotwinError(lines[-1] if lines else f"kilotwin ended with status {done.returncode}", done.returncode)
-    return done.stdout
+    return done.returncode, done.stdout, done.stderr
+
+
+def error_of(status: int, said: str) -> KilotwinError:
+    """The error of a program that ended with this status and said this on standard error: its last line."""
+    lines = [line for line in said.splitlines() if line.strip()]
+    return KilotwinError(lines[-1] if lines else f"kilotwin ended with status {status}", status)
+
+
+def call(words: Sequence[str]) -> str:
+    """Runs the program and returns its standard output. Raises KilotwinError unless its status is 0."""
+    status, output, said = ended(words)
+    if status != 0:
+        raise error_of(status, said)
+    return output
 
 
 def text_of(value: Any) -> str:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import csv
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Mapping
+from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
-from kilotwin._program import call, common_words, text_of
+from kilotwin._program import KilotwinError, common_words, ended, error_of, text_of
 from kilotwin._run import Run
 
 if TYPE_CHECKING:
@@ -23,12 +23,16 @@ class Sweep:
 
     def runs(self) -> list[Run]:
         """The runs that came to their end, by point and seed."""
+        # The table names a run's directory as the command saw it, from the folder where it ran.
+        return [Run(self.directory / Path(row["directory"]).name) for row in self._rows() if row["well"] == "1"]
+
+    def _rows(self) -> list[dict[str, str]]:
         with open(self.directory / "runs.csv", newline="") as file:
-            return [Run(row["directory"]) for row in csv.DictReader(file) if row["well"] == "1"]
+            return list(csv.DictReader(file))
 
     def table(self, name: str = "runs") -> pandas.DataFrame:
         """`runs`: a row per run, failed ones included; `sweep`: a row per point, means and standard errors (_se) at the end;
-        `curves`: the same over time. Needs pandas."""
+        `curves`: the same over time; `designs`: with several models, a row per design. Needs pandas."""
         import pandas as pd
 
         return pd.read_csv(self.directory / f"{name}.csv")
@@ -46,6 +50,8 @@ def sweep(
     behaviour: str | os.PathLike[str] | None = None,
     duration_s: float | None = None,
     model: str | os.PathLike[str] | None = None,
+    models: Sequence[str | os.PathLike[str]] = (),
+    goal: str | None = None,
     define: Mapping[str, Any] | None = None,
     resume: bool = False,
     force: bool = False,
@@ -53,7 +59,9 @@ def sweep(
     """Runs an experiment over seeds and values, on all cores.
 
     seeds: "1..20". set: per field a list of values, or a text such as "10..200:10" or "log:0.01..10:7". latin: so many points of a
-    Latin hypercube over the ranges in place of all combinations. resume: goes on with the sweep in `out`. Runs that fail are
+    Latin hypercube over the ranges in place of all combinations. models: files, or directories of them; every point runs with each, and
+    `table("designs")` ranks the points by their worst model, where the `goal` says which value is better: "largest" or "smallest".
+    resume: goes on with the sweep in `out`. Runs that fail are
     listed in the table; the others are there. Raises KilotwinError for wrong input, or if no run came to its end.
     """
     words = ["sweep", os.fspath(experiment)]
@@ -65,13 +73,19 @@ def sweep(
     for option, value in [("--latin", latin), ("--jobs", jobs)]:
         if value is not None:
             words += [option, str(value)]
+    if models:
+        words += ["--models", *(os.fspath(file) for file in models)]
+    if goal is not None:
+        words += ["--goal", goal]
     words += common_words(
         robots=robots, behaviour=behaviour, duration_s=duration_s, model=model, define=define, out=None if resume else out, force=force
     )
     if resume:
         words += ["--resume", os.fspath(out)]
-    call(words, accepted=(0, 1))
+    status, _, said = ended(words)
     done = Sweep(out)
-    if not (done.directory / "runs.csv").exists():
-        call(words)
+    if status not in (0, 1) or not (done.directory / "runs.csv").exists():
+        raise error_of(status, said)
+    if not done.runs():
+        raise KilotwinError(f"no run came to its end: {done._rows()[0]['failure']}", status)
     return done

@@ -25,8 +25,10 @@ class Table(Mapping[str, np.ndarray]):
         self._read: dict[str, np.ndarray] = {}
         with zipfile.ZipFile(file) as archive:
             about = json.loads(archive.comment)
+            # With very many columns, only the arrays' own comments describe them.
+            columns = about.pop("columns") or [json.loads(member.comment) for member in archive.infolist()]
         #: Unit of each column: "mm", "s", "rad"; empty for pure numbers and texts.
-        self.units: dict[str, str] = {column["name"]: column["unit"] for column in about.pop("columns")}
+        self.units: dict[str, str] = {column["name"]: column["unit"] for column in columns}
         #: Where the table comes from: experiment, seed, run, state_hash, version, build, date.
         self.about: dict[str, str] = about
 

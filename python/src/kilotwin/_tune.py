@@ -74,7 +74,7 @@ def tune(
     """Searches the values of fields and macros that make an observable largest or smallest, by CMA-ES.
 
     vary, vary_define: per field or macro its range, such as "10..200" or "log:0.1..10". seeds: runs per point. budget: runs in all.
-    models: each point runs with all of them, and the mean counts, or with `worst` the worst. Raises KilotwinError for wrong input.
+    models: files, or directories of them; each point runs with all, and the mean counts, or with `worst` the worst. Raises KilotwinError for wrong input.
     """
     if (maximise is None) == (minimise is None):
         raise ValueError("give maximise or minimise")

@@ -237,6 +237,38 @@ TEST(PogosimImport, TakesOverWhatHasACounterpart) {
   EXPECT_GT(e.movable(1).x_mm() - e.movable(0).x_mm(), 70);
 }
 
+TEST(PogosimImport, TakesPosesFromTheTableThatItNames) {
+  const std::string text = R"(
+arena_file: arenas/square.csv
+arena_surface: 1.0e6
+initial_formation: imported
+formation_filename: t.csv
+objects: { a: { type: pogobot, nb: 2 }, b: { type: pogobot, nb: 1 } }
+)";
+  const auto with = [&](const std::string& table, const std::string& more = "") {
+    return from_pogosim(text + more, "c.yaml", [table](const std::string& file) {
+      return file == "t.csv" ? std::optional(table) : std::nullopt;
+    });
+  };
+  // From pogosim's corner to the centre of 1000 by 1000 mm; rows after the first time are those of a run.
+  const Imported imported = with(
+      "time,robot_id,x,y,angle\n0,0,500,600,0\n0,1,100,900,3.14159265358979\n0,2,0,0,-1.5707963267949\n1,0,1,1,"
+      "0\n");
+  ASSERT_EQ(imported.poses.size(), 2u);
+  EXPECT_EQ(imported.poses[0].text, "x_mm,y_mm,heading_deg\n0,100,0\n-400,400,180\n");
+  EXPECT_EQ(imported.poses[1].text, "x_mm,y_mm,heading_deg\n-500,-500,-90\n");
+  EXPECT_EQ(imported.experiment.robots(1).layout().poses().csv(), imported.poses[1].name);
+  // Coordinates of another range are stretched to the arena.
+  const Imported stretched =
+      with("x,y\n10,20\n15,20\n12,21\n",
+           "imported_formation_min_coords: [10, 20]\nimported_formation_max_coords: [20, 30]\n");
+  EXPECT_EQ(stretched.poses[0].text, "x_mm,y_mm,heading_deg\n-500,-500,0\n0,-500,0\n");
+  EXPECT_TRUE(notes(stretched, "lacks angles"));
+  EXPECT_THROW(static_cast<void>(with("x,y\n1,2\n1,3\n")), UserError) << "two poses for three robots";
+  EXPECT_THROW(static_cast<void>(with("x,z\n1,2\n1,3\n1,4\n")), UserError);
+  EXPECT_TRUE(notes(from_pogosim(text, "c.yaml"), "is no CSV file that can be read"));
+}
+
 TEST(PogosimImport, SaysWhatWasNotTakenOverWithItsLine) {
   const Imported imported = from_pogosim(kPogosim, "c.yaml");
   for (const char* note :
@@ -263,7 +295,8 @@ TEST(PogosimImport, NamesThePlaceOfAnError) {
 }
 
 TEST(PogosimImport, SurvivesAnyChangeOfItsFile) {
-  const int refused = refused_of_3000(kPogosim, from_pogosim);
+  const int refused = refused_of_3000(
+      kPogosim, [](std::string_view text, const std::string& name) { return from_pogosim(text, name); });
   EXPECT_GT(refused, 300);
   EXPECT_LT(refused, 3000);
 }
@@ -304,6 +337,41 @@ TEST(LogImport, AnArkLogBecomesTracksAndTrackedRobots) {
   EXPECT_EQ(e.door(0).robots().robot(1).robot(), 1u);
   for (const char* words : {"orientation", "colour", "state", "commands", "4 to 9", "1 positions are no numbers"})
     EXPECT_TRUE(notes(log_of.imported, words)) << words;
+}
+
+TEST(LogImport, ALarsLogIsInPixelsOfItsCamera) {
+  const std::string rows =
+      "a\nb\nc\nd\ne\nf\ng\nh\ni\n33\t0\t100\t200\t1\t1\t300\t400\t2\n66\t0\t110\t200\t1\t1\t300\t400\t2\n";
+  const LogFile log(rows);
+  const ImportedLog log_of = from_tracker_log(log.path(), {{}, 0.5});
+  const std::string run = log.path().stem().string();
+  EXPECT_EQ(log_of.tracks, "run,robot,time_s,x_mm,y_mm\n" + run + ",0,0,-430,200\n" + run + ",1,0,-330,100\n" +
+                               run + ",0,0.033,-425,200\n" + run + ",1,0.033,-330,100\n");
+  const proto::Experiment& e = log_of.imported.experiment;
+  EXPECT_EQ(e.arena().width_mm(), 960);
+  EXPECT_EQ(e.arena().height_mm(), 600);
+  ASSERT_EQ(e.door_size(), 1);
+  EXPECT_EQ(e.door(0).log().format(), proto::LogDoor::LARS);
+  EXPECT_FALSE(e.door(0).has_robots()) << "numbers count from 0";
+  for (const char* words : {"header: nine lines", "colour", "commands"})
+    EXPECT_TRUE(notes(log_of.imported, words)) << words;
+  const auto error = [&](std::optional<double> unit_mm) -> std::string {
+    try {
+      static_cast<void>(from_tracker_log(log.path(), {{}, unit_mm}));
+    } catch (const UserError& refused) {
+      return refused.what();
+    }
+    return {};
+  };
+  EXPECT_NE(error({}).find("give --unit-mm"), std::string::npos) << error({});
+  EXPECT_NE(error(0.001).find("smaller than a robot"), std::string::npos) << error(0.001);
+}
+
+TEST(KilomboImport, RefusesNumbersBeyondItsFields) {
+  for (const char* wrong :
+       {R"({"nBots": 1e10})", R"({"randSeed": 1e300})", R"({"nBots": 1e999})", R"({"nBots": -1})"})
+    EXPECT_THROW(static_cast<void>(from_kilombo(wrong, "k.json")), UserError) << wrong;
+  EXPECT_EQ(from_kilombo(R"({"nBots": 7.5, "randSeed": 12})", "k.json").experiment.seed(), 12u);
 }
 
 TEST(LogImport, ALineThatIsNoneIsNamed) {

@@ -204,6 +204,29 @@ TEST(Export, GroupsAndStatesAreNamed) {
                 "0,1,0.0000,0.0000,0.000000,3,0,0,0,flat,0", "0,2,0.0000,0.0000,0.000000,0,3,0,1,77,0"}));
 }
 
+TEST(Export, PogosimsTableHasItsColumnsAndItsOrigin) {
+  const Scratch scratch;
+  proto::RecordingHeader header = synthetic_header(2);
+  const auto exported = [&](const std::string& recording) {
+    {
+      Writer writer(scratch / recording, header);
+      const std::vector<double> x{-1000, 250}, y{500, 0}, heading{1.5, -3};
+      const std::vector<std::uint8_t> led(2, 0), life(2, 0);
+      writer.state({Tick{0}, x, y, heading, led, life});
+      writer.end(Tick{0}, 0);
+    }
+    Reader reader(scratch / recording);
+    export_pogosim(reader, scratch / "p.csv");
+    return lines_of(scratch / "p.csv");
+  };
+  EXPECT_EQ(exported("one.ktrec"),
+            (std::vector<std::string>{std::string(kPogosimColumns), "0,robots,0,0.0000,1000.0000,1.500000",
+                                      "0,robots,1,1250.0000,500.0000,-3.000000"}));
+  header.add_group_robots(1);
+  header.add_group_robots(1);
+  EXPECT_EQ(exported("two.ktrec").at(2), "0,robots-1,1,1250.0000,500.0000,-3.000000");
+}
+
 TEST(Export, TablesWhoseNameEndsInGzAreGzipped) {
   const Scratch scratch;
   write_synthetic(scratch / "r.ktrec", synthetic_header(50), 400);

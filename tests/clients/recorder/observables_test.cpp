@@ -36,6 +36,20 @@ TEST(Observables, OfARecordingOfStraightMotion) {
   }
 }
 
+TEST(Observables, OfGroupsComeWithThoseOfAll) {
+  const Scratch scratch;
+  proto::RecordingHeader header = synthetic_header(3);
+  header.add_group_robots(2);
+  header.add_group_robots(1);
+  write_synthetic(scratch / "r.ktrec", header, 62);
+  Reader reader(scratch / "r.ktrec"), again(scratch / "r.ktrec");
+  const std::vector<ObservableCurves> observed = observe_with_groups(reader);
+  ASSERT_EQ(observed.size(), 3u);
+  EXPECT_EQ(observed[0].of(Observable::kSpread), observe(again).of(Observable::kSpread));
+  EXPECT_NEAR(observed[1].of(Observable::kDisplacement)[2], 62 * (0.5 + std::hypot(0.5, 0.25)) / 2, 1e-9);
+  EXPECT_NEAR(observed[2].of(Observable::kDisplacement)[2], 62 * std::hypot(0.5, 0.5), 1e-9);
+}
+
 TEST(Observables, PolarisationIsOneForACommonDirectionAndZeroForNone) {
   const std::vector<double> at{0, 100, 200, 300}, alike(4, 2.5),
       crossed{0.3, 0.3 + 1.5707963267948966, 0.3 + 3.141592653589793, 0.3 - 1.5707963267948966};

@@ -103,6 +103,30 @@ assert about["seed"] == "7" and about["version"] == '1, "two"' and about["column
 )");
 }
 
+TEST_F(TableTest, AnArchiveOfManyColumnsStillSaysWhatTheyAre) {
+  std::vector<Column> columns;
+  for (int i = 0; i < 2000; ++i)
+    columns.push_back({"variable_with_a_long_name_" + std::to_string(i), "mm", CellType::kInteger});
+  for (const std::size_t longest : std::vector<std::size_t>{10, 70'000}) {
+    const auto table = open_table(folder_ / ("wide-" + std::to_string(longest) + ".npz"), columns,
+                                  {{"seed", "7"}, {"command_line", std::string(longest, 'x')}});
+    for (int i = 0; i < 2000; ++i) table->integer(i);
+    table->end_row();
+    table->close();
+  }
+  python("numpy", R"(
+import json, sys, zipfile, numpy as np
+for longest in (10, 70000):
+    name = f"{sys.argv[1]}/wide-{longest}.npz"
+    archive = zipfile.ZipFile(name)
+    about = json.loads(archive.comment)
+    assert about["seed"] == "7" and len(about.get("command_line", "")) == (10 if longest == 10 else 0)
+    units = {c["name"]: (c["unit"], c["type"]) for c in (json.loads(m.comment) for m in archive.infolist())}
+    assert len(units) == 2000 and units["variable_with_a_long_name_7"] == ("mm", "integer")
+    assert np.load(name)["variable_with_a_long_name_1999"][0] == 1999
+)");
+}
+
 TEST_F(TableTest, ArrowsOwnReaderReadsTheFile) {
   write("t.arrow");
   const auto table =
