@@ -36,11 +36,20 @@ void write_program(const fs::path& compiled, const BuildArguments& arguments) {
   fmt::print("{}\n", out.string());
 }
 
+/// The notes and warnings about a program; one that is given compiled has none.
+void show_remarks(const behaviours::CompiledProgram& program, const behaviours::CompileOptions& options) {
+  for (const std::string& note : program.notes) say("note: " + note);
+  if (program.sources.empty()) return;
+  for (const std::string& warning : behaviours::program_warnings(program.sources, program.sha256, options))
+    say(warning);
+}
+
 int build_for_robot(const BuildArguments& arguments, const behaviours::CompileOptions& options) {
-  if (!arguments.out.empty())
-    write_program(behaviours::compile_firmware(arguments.sources, options).file, arguments);
+  const behaviours::CompiledProgram compiled = behaviours::compile_firmware(arguments.sources, options);
+  show_remarks(compiled, options);
+  if (!arguments.out.empty()) write_program(compiled.file, arguments);
   constexpr double kFlash = 32768, kRam = 2048;
-  const behaviours::AvrSize size = behaviours::compile_for_avr(arguments.sources, options);
+  const behaviours::AvrSize size = behaviours::compile_for_avr(compiled.sources, options);
   fmt::print(
       "ATmega328P: {} octets of flash ({:.1f} % of 32 KiB), {} octets of RAM ({:.1f} % of 2 KiB), without "
       "kilolib and the stack\n",
@@ -60,11 +69,7 @@ int build(const BuildArguments& arguments) {
   }
   if (arguments.avr) return build_for_robot(arguments, options);
   const behaviours::CompiledProgram compiled = behaviours::compile(arguments.sources, options);
-  for (const std::string& note : compiled.notes) say("note: " + note);
-  if (arguments.sources.front().extension() != ".so") {
-    for (const std::string& warning : behaviours::program_warnings(arguments.sources, compiled.sha256, options))
-      say(warning);
-  }
+  show_remarks(compiled, options);
   write_program(compiled.file, arguments);
   return kDone;
 }

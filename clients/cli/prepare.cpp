@@ -70,15 +70,14 @@ behaviours::CompiledProgram checked_firmware(const fs::path& file) {
   return {file, behaviours::sha256_hex(*octets), {}};
 }
 
-/// Shows a program's warnings, the first of them if there are many.
-void show_warnings(const std::vector<fs::path>& sources, const std::string& sha256,
-                   const behaviours::CompileOptions& options) {
+/// Shows a program's warnings, the first of them if there are many. A program that is given compiled has no sources.
+void show_warnings(const behaviours::CompiledProgram& program, const behaviours::CompileOptions& options) {
   constexpr std::size_t kMost = 10;
-  if (sources.front().extension() == ".so") return;
-  const std::vector<std::string> warnings = behaviours::program_warnings(sources, sha256, options);
+  if (program.sources.empty()) return;
+  const std::vector<std::string> warnings = behaviours::program_warnings(program.sources, program.sha256, options);
   for (std::size_t n = 0; n < std::min(warnings.size(), kMost); ++n) say(warnings[n]);
   if (warnings.size() > kMost) {
-    say(fmt::format("{}: {} more warnings; `kilotwin build` shows all", sources.front().string(),
+    say(fmt::format("{}: {} more warnings; `kilotwin build` shows all", program.sources.front().string(),
                     warnings.size() - kMost));
   }
 }
@@ -112,7 +111,7 @@ std::vector<fs::path> build_programs(const LoadedExperiment& loaded, const RunAr
     const bool is_new =
         std::none_of(manifest.program().begin(), manifest.program().end(),
                      [&](const proto::Program& program) { return program.sha256() == compiled.sha256; });
-    if (notes == Notes::kPrinted && is_new && !is_firmware) show_warnings(sources, compiled.sha256, options);
+    if (notes == Notes::kPrinted && is_new && !is_firmware) show_warnings(compiled, options);
     int index = 0;
     while (index < manifest.program_size() && manifest.program(index).sha256() != compiled.sha256) ++index;
     if (index == manifest.program_size()) {

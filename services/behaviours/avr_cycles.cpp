@@ -11,10 +11,23 @@ struct Cost {
   unsigned cycles;
 };
 
+/// Octets that an instruction moves from or to memory, by the size in its name. Quadwords are pointers, which have two octets on the
+/// robot.
+unsigned octets_of(std::string_view name) {
+  constexpr std::size_t kSourceSize = 4;  // movzbl, movswl
+  const bool extends = name.starts_with("movz") || name.starts_with("movs");
+  if (name.ends_with("ss") || name.ends_with("sd") || name.ends_with("ps") || name.ends_with("pd")) return 4;
+  switch (extends && name.size() > kSourceSize ? name[kSourceSize] : name.back()) {
+    case 'b': return 1;
+    case 'l': return 4;
+    default: return 2;
+  }
+}
+
 }  // namespace
 
 unsigned avr_cycles(std::string_view name, std::string_view operands) {
-  // The first entry whose beginning matches applies.
+  // The first entry whose beginning matches applies. Moves between memory and registers take no cycles besides those of the memory.
   static constexpr std::array kCosts{
       Cost{"call", 8},    Cost{"ret", 4},     Cost{"push", 2},   Cost{"pop", 2},    Cost{"lea", 2},
       Cost{"nop", 0},     Cost{"cltq", 0},    Cost{"cltd", 0},   Cost{"cqto", 0},   Cost{"movs", 1},
@@ -31,7 +44,12 @@ unsigned avr_cycles(std::string_view name, std::string_view operands) {
       break;
     }
   }
-  return operands.find('(') != std::string_view::npos && !name.starts_with("lea") ? cycles + 3 : cycles;
+  if (operands.find('(') == std::string_view::npos || name.starts_with("lea")) return cycles;
+  // LDS, STS, LD and ST take two cycles per octet. An instruction that changes memory loads and stores it.
+  const unsigned transfer = 2 * octets_of(name);
+  if (name.starts_with("mov")) return transfer;
+  const bool changes = operands.ends_with(')') && !name.starts_with("cmp") && !name.starts_with("test");
+  return cycles + (changes ? 2 : 1) * transfer;
 }
 
 }  // namespace kilotwin::behaviours

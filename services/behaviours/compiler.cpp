@@ -6,13 +6,12 @@
 #include <cstdlib>
 #include <memory>
 #include <optional>
-#include <set>
-#include <sstream>
 #include <system_error>
 
 #include "core/base/error.hpp"
 #include "core/os/files.hpp"
 #include "core/os/process.hpp"
+#include "services/behaviours/companions.hpp"
 #include "services/behaviours/compiler_common.hpp"
 #include "services/behaviours/cycle_counters.hpp"
 #include "services/behaviours/elf_file.hpp"
@@ -253,11 +252,6 @@ fs::path runtime_object(const Compiler& compiler, const Arguments& includes, con
   return kept;
 }
 
-/// The linker's messages about a program with undefined functions or variables.
-struct Incomplete {
-  std::string errors;
-};
-
 /// Links twice. The first link gives the size of the variables. The second aligns their end with the end of a page, so that an
 /// access beyond them faults.
 std::string linked(const Arguments& first, const Arguments& rest, const fs::path& place,
@@ -394,65 +388,13 @@ bool mentions(const std::vector<fs::path>& sources, std::string_view word) {
   return false;
 }
 
-/// The sources that an earlier search added to these, one path per line, in the cache.
-fs::path search_result(const Toolchain& toolchain, const std::vector<fs::path>& sources) {
-  std::string key;
-  for (const fs::path& source : sources) {
-    std::error_code error;
-    key += fs::absolute(source, error).lexically_normal().string() + '\n';
-  }
-  for (const std::string& flag : toolchain.defines) key += flag + '\n';
-  return toolchain.cache / "searches" / sha256_hex(key);
-}
-
-/// Makes the program, and adds missing sources until it links or no further source is found. Begins with those that it found
-/// the last time.
-CompiledProgram complete(const Toolchain& toolchain, std::vector<fs::path> sources, const Arguments& dialect) {
-  std::vector<std::string> notes;
-  const fs::path search = search_result(toolchain, sources);
-  const std::size_t given = sources.size();
-  const auto add = [&](const fs::path& source) {
-    notes.push_back(source.string() + ": compiled too; it has what the program lacks");
-    sources.push_back(source);
-  };
-  std::istringstream found(os::read_if_there(search).value_or(""));
-  for (std::string line; std::getline(found, line);) {
-    std::error_code error;
-    if (fs::is_regular_file(line, error)) add(fs::relative(line));
-  }
-  bool searched = false;
-  for (;;) {
-    const ProgramText text = program_text(sources, toolchain.cache);
-    try {
-      CompiledProgram program = toolchain.make(text, dialect);
-      if (searched) {
-        std::string all;
-        for (std::size_t n = given; n < sources.size(); ++n) all += fs::absolute(sources[n]).string() + '\n';
-        std::error_code error;
-        fs::create_directories(search.parent_path(), error);
-        os::write_file(search, all);
-      }
-      notes.insert(notes.begin(), text.notes.begin(), text.notes.end());
-      program.notes = std::move(notes);
-      return program;
-    } catch (const UserError& error) {
-      if (!searched && sources.size() > given) {  // what was found then no longer fits
-        sources.resize(given);
-        notes.clear();
-        searched = true;
-        continue;
-      }
-      std::string all = error.what();
-      for (const std::string& note : text.notes) all += "\nnote: " + note;
-      throw UserError(all);
-    } catch (const Incomplete& incomplete) {
-      searched = true;
-      auto preprocessed = [&](const fs::path& source) { return toolchain.preprocessed(source, dialect); };
-      const std::vector<fs::path> more = sources_with(undefined_names(incomplete.errors), text, preprocessed);
-      if (more.empty()) throw UserError(all_errors(incomplete.errors, text.sources));
-      for (const fs::path& source : more) add(source);
-    }
-  }
+CompiledProgram complete(const Toolchain& toolchain, const std::vector<fs::path>& sources,
+                         const Arguments& dialect) {
+  std::string kind = "simulation";
+  for (const std::string& flag : toolchain.defines) kind += '\n' + flag;
+  return with_companions(sources, toolchain.cache,
+                         {kind, [&](const ProgramText& text) { return toolchain.make(text, dialect); },
+                          [&](const fs::path& source) { return toolchain.preprocessed(source, dialect); }});
 }
 
 /// complete(), with the robot's int if the program allows it.

@@ -21,6 +21,8 @@ struct CompiledProgram {
   std::filesystem::path file;      ///< a self-contained shared object
   std::string sha256;              ///< SHA-256 of the file, hexadecimal
   std::vector<std::string> notes;  ///< lines for the user: sources left out or added, options that had to be added
+  /// The sources of which it was made: the named ones without copies of kilolib, and those that were found.
+  std::vector<std::filesystem::path> sources{};
 };
 
 /// Compiles C and C++ sources, together with the embedded runtime, into one shared object with fixed compiler flags. Ignores
@@ -32,7 +34,8 @@ struct CompiledProgram {
                                       const CompileOptions& options = {});
 
 /// Compiles and links C sources with avr-gcc and this project's kilolib for the robot's processor. The result is an .elf file in
-/// the cache that runs on a robot and on its simulated processor. Throws UserError like compile().
+/// the cache that runs on a robot and on its simulated processor. Searches for missing sources, and keys the cache, as compile()
+/// does. Throws UserError like compile().
 [[nodiscard]] CompiledProgram compile_firmware(const std::vector<std::filesystem::path>& sources,
                                                const CompileOptions& options = {});
 
@@ -54,7 +57,8 @@ struct AvrSize {
   std::uint32_t ram_octets = 0;    ///< globals and statics
 };
 
-/// Compiles the sources with avr-gcc for the robot's processor and measures their size. Throws UserError like compile().
+/// Compiles the sources with avr-gcc for the robot's processor and measures their size. `sources` must be all of the program:
+/// CompiledProgram::sources. Throws UserError like compile().
 [[nodiscard]] AvrSize compile_for_avr(const std::vector<std::filesystem::path>& sources,
                                       const CompileOptions& options = {});
 

@@ -1,6 +1,7 @@
 #include "services/behaviours/compiler_common.hpp"
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <sstream>
 #include <string_view>
@@ -178,11 +179,11 @@ namespace {
 
 /// A note about names in capitals that the program lacks, which a makefile may define; empty: none.
 std::string note_of_macros(const std::vector<std::string>& errors) {
-  constexpr std::string_view kMark = "' undeclared";
+  constexpr std::array<std::string_view, 2> kMarks{"' undeclared", "' was not declared"};  // of C and of C++
   constexpr std::string_view kCapitals = "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_";
   std::set<std::string> names;
   for (const std::string& error : errors) {
-    const std::size_t end = error.find(kMark);
+    const std::size_t end = std::min(error.find(kMarks[0]), error.find(kMarks[1]));
     if (end == std::string::npos || end == 0) continue;
     const std::size_t quote = error.rfind('\'', end - 1);
     if (quote == std::string::npos) continue;

@@ -361,6 +361,16 @@ std::vector<fs::path> sources_around(const ProgramText& text) {
 
 }  // namespace
 
+std::string files_around(const ProgramText& text) {
+  std::string result;
+  for (const fs::path& file : sources_around(text)) {
+    std::error_code error;
+    result += file.string() + '\t' + std::to_string(fs::file_size(file, error)) + '\t' +
+              std::to_string(fs::last_write_time(file, error).time_since_epoch().count()) + '\n';
+  }
+  return result;
+}
+
 std::vector<fs::path> sources_with(const std::set<std::string>& missing, const ProgramText& text,
                                    const std::function<std::string(const fs::path&)>& preprocessed) {
   static const std::regex kMain(R"(\bmain\s*\()");

@@ -32,6 +32,9 @@ struct ProgramText {
     const std::set<std::string>& missing, const ProgramText& text,
     const std::function<std::string(const std::filesystem::path&)>& preprocessed);
 
+/// One line per source file around a program, in the order of the search: path, size, time of its last change.
+[[nodiscard]] std::string files_around(const ProgramText& text);
+
 /// Whether a source's file name has an ending of C++.
 [[nodiscard]] bool is_cpp(const std::filesystem::path& source);
 

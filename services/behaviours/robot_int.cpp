@@ -58,6 +58,8 @@ class Narrower {
         i = std::min(closing(tokens_, i + 1), tokens_.size() - 1);
       } else if (is_specifier(word)) {
         i = declaration(i, depth) - 1;
+      } else if (word[0] >= '0' && word[0] <= '9') {
+        literal(i);
       } else if (depth > 0) {
         store(i);
       }
@@ -88,27 +90,46 @@ class Narrower {
 
   /// Handles a run of specifiers from token `i` on; returns the index after it.
   std::size_t declaration(std::size_t i, int depth) {
-    std::size_t end = i;
-    bool narrow = false, other = false, keeps = false;
-    std::size_t sign = kNowhere, plain = kNowhere;
+    static constexpr std::array<std::string_view, 6> kOthers{"short", "char",  "double",
+                                                             "float", "_Bool", "_Complex"};
+    static constexpr std::array<std::string_view, 3> kKept{"static", "extern", "typedef"};
+    std::size_t end = i, sign = kNowhere, plain = kNowhere, wide = kNowhere;
+    int longs = 0;
+    bool other = false, keeps = false, has_sign = true;
     for (; end < tokens_.size() && is_specifier(tokens_[end].text); ++end) {
-      static constexpr std::array<std::string_view, 8> kOthers{"unsigned", "short", "long",  "char",
-                                                               "double",   "float", "_Bool", "_Complex"};
-      static constexpr std::array<std::string_view, 3> kKept{"static", "extern", "typedef"};
       const std::string_view word = tokens_[end].text;
       if (word == "int") plain = end;
-      if (word == "signed") sign = end;
+      if (word == "signed" || word == "unsigned") sign = end;
+      if (word == "long") wide = end, ++longs;
+      has_sign = has_sign && word != "unsigned";
       other = other || is_one_of(word, kOthers);
       keeps = keeps || is_one_of(word, kKept);
     }
-    narrow = !other && (plain != kNowhere || sign != kNowhere);
-    if (!narrow) return end;
+    if (other || longs > 1) return end;
+    if (longs == 1) {
+      replace(wide, 1, "int");
+      if (plain != kNowhere) replace(plain, 1, "");
+      return end;
+    }
     if (plain != kNowhere)
       replace(plain, 1, "short");
-    else
+    else if (sign != kNowhere)
       insert(tokens_[sign].at + tokens_[sign].text.size(), " short");
-    if (depth > 0 && !keeps) initial_values(end);
+    else
+      return end;
+    if (has_sign && depth > 0 && !keeps) initial_values(end);
     return end;
+  }
+
+  /// Removes the L of an integer literal, whose 32 bits are those of an int here.
+  void literal(std::size_t i) {
+    std::string_view word = tokens_[i].text;
+    const bool is_hex = word.size() > 1 && (word[1] == 'x' || word[1] == 'X');
+    const bool is_fraction = (i > 0 && is(i - 1, ".") && is_joined(i - 1)) || (is(i + 1, ".") && is_joined(i)) ||
+                             (!is_hex && word.find_first_of("eE.") != std::string_view::npos);
+    const std::size_t first = word.find_first_of("lL");
+    if (is_fraction || first == std::string_view::npos || word.find_last_of("lL") != first) return;
+    edits_.push_back({tokens_[i].at + first, 1, ""});
   }
 
   /// `x = VALUE, y = VALUE;` after the type.

@@ -16,6 +16,7 @@
 #include "core/os/process.hpp"
 #include "services/behaviours/compiler_common.hpp"
 #include "services/behaviours/program_text.hpp"
+#include "services/behaviours/sha256.hpp"
 
 namespace kilotwin::behaviours {
 namespace fs = std::filesystem;
@@ -266,8 +267,10 @@ std::vector<std::string> usual_warnings(const std::vector<fs::path>& sources, co
 std::vector<std::string> program_warnings(const std::vector<fs::path>& sources, const std::string& sha256,
                                           const CompileOptions& options) {
   const fs::path cache = os::cache_directory(options.cache_directory);
-  const bool for_robot = !os::find_executable("avr-gcc").empty();
-  const fs::path kept = cache / "warnings" / (sha256 + (for_robot ? "-robot" : "-host"));
+  // Warnings name the sources as they are named here. The same program may lie elsewhere.
+  std::string key = sha256 + (os::find_executable("avr-gcc").empty() ? "-host" : "-robot");
+  for (const fs::path& source : sources) key += '\n' + source.string();
+  const fs::path kept = cache / "warnings" / sha256_hex(key);
   std::vector<std::string> result;
   if (const auto known = os::read_if_there(kept)) {
     std::istringstream lines(*known);

@@ -16,7 +16,8 @@ namespace kilotwin::behaviours {
 [[nodiscard]] std::vector<std::string> robot_warnings(const std::vector<std::filesystem::path>& sources,
                                                       const CompileOptions& options = {});
 
-/// robot_warnings() and the compiler's own warnings about a program of this hash. Kept in the cache, so that runs can show them.
+/// robot_warnings() and the compiler's own warnings about a program of this hash. `sources`: CompiledProgram::sources. Kept in the
+/// cache, so that runs can show them.
 [[nodiscard]] std::vector<std::string> program_warnings(const std::vector<std::filesystem::path>& sources,
                                                         const std::string& sha256,
                                                         const CompileOptions& options = {});

@@ -163,6 +163,15 @@ TEST_F(Commands, BuildForTheRealRobotPrintsSizes) {
   write(scratch / "b.c", "char shared[1000];\nvoid other(void) { shared[0] = 1; }\n");
   EXPECT_NE(kilotwin({"build", scratch / "a.c", scratch / "b.c", "--avr"}, scratch).out.find(" 1000 octets of RAM"),
             std::string::npos);
+  // The second file is found, and what the robot computes differently is said.
+  write(
+      scratch / "c.c",
+      "#include <kilolib.h>\nvoid other(void);\nuint8_t s;\nuint32_t t;\nstatic void loop(void) { other(); t = s * "
+      "1000; }\nint main(void) { kilo_init(); kilo_start(loop, loop); return 0; }\n");
+  const Outcome warned = kilotwin({"build", scratch / "c.c", "--avr"}, scratch);
+  EXPECT_NE(warned.out.find(" octets of RAM"), std::string::npos) << warned.err;
+  EXPECT_NE(warned.err.find("b.c: compiled too"), std::string::npos) << warned.err;
+  EXPECT_NE(warned.err.find("c.c:5:"), std::string::npos) << warned.err;
 }
 
 TEST_F(Commands, TheExperimentAsRunRunsAgain) {

@@ -70,8 +70,10 @@ struct KtRobot {
   uint8_t trigger_lost; /* get_voltage() was called since the last message */
   uint8_t looped;       /* host: the tick ended in a loop that reads no memory that an interrupt may change */
   uint32_t heap_octets; /* largest extent of the heap so far */
-  uint16_t blocked_at;  /* low bits of kilo_ticks when the program last kept interrupts off for long */
-  uint16_t blocked;     /* for how long: units of KT_BLOCKED_UNIT cycles */
+  uint16_t
+      blocked_at; /* low bits of kilo_ticks: the messages that are heard then lie in the tick to which blocked refers */
+  uint16_t
+      blocked; /* end of the last long time with interrupts off: units of KT_BLOCKED_UNIT cycles of that tick */
   /* Time at full duty of both motors. The host takes and resets it at the end of each tick. */
   uint32_t full_from;   /* cycle of the tick */
   uint32_t full_cycles; /* in this tick, before full_from */

@@ -5,6 +5,7 @@
 #include <stddef.h>
 #include <util/delay.h>
 
+#include "budget.h"
 #include "core/base/eeprom_layout.h"
 #include "core/base/message_crc.h"
 #include "core/math/elementary.h"
@@ -79,29 +80,56 @@ IN_LINE void wait_for_tick(void) {
 
 enum { MOST_AT_ONCE = 1 << 30 };
 
-static int32_t cycles_left(void) {
-  int32_t left;
-  __asm__ volatile("movl %%gs:%c1, %0" : "=r"(left) : "i"(KT_THREAD_BUDGET));
-  return left;
-}
-
 static int32_t cycles_held(void) {
   int32_t held;
   __asm__ volatile("movl %%gs:%c1, %0" : "=r"(held) : "i"(KT_THREAD_HELD));
   return held;
 }
 
-static void set_cycles_left(int32_t left) {
-  __asm__ volatile("movl %0, %%gs:%c1" : : "r"(left), "i"(KT_THREAD_BUDGET) : "memory");
+/* Cycles of the library's functions on the robot: this project's kilolib for the AVR as avr-gcc 5.4 compiles it. Its code here is
+ * not counted by itself. LOOP: from one return of loop() to the next call. */
+enum {
+  LOOP_CYCLES = 20,
+  SET_MOTORS_CYCLES = 8,
+  SET_COLOR_CYCLES = 26,
+  RAND_SOFT_CYCLES = 26,
+  MESSAGE_CRC_CYCLES = 390,
+  ESTIMATE_DISTANCE_CYCLES = 800
+};
+
+/* Number of this tick's messages whose callbacks have begun, of how many, and what is known of their times. */
+static struct {
+  uint32_t index, count, drawn;
+  uint32_t cycle; /* at which message drawn - 1 ended */
+} arrivals;
+
+static uint64_t noise(void);
+
+/* Cycle of the tick at which the message that is being received ended. The times of a tick's messages are random; their order
+ * is known. So the next one is the first of as many random times as messages are left. */
+static uint32_t arrival(void) {
+  for (; arrivals.drawn <= arrivals.index; ++arrivals.drawn) {
+    const uint32_t rest = robot.tick_cycles - arrivals.cycle;
+    uint64_t first = rest;
+    for (uint32_t left = arrivals.count - arrivals.drawn; left > 0; --left) {
+      const uint64_t one = rest == 0 ? 0 : (noise() >> 11) % rest;
+      if (one < first) first = one;
+    }
+    arrivals.cycle += (uint32_t)first;
+  }
+  return arrivals.cycle;
 }
 
-/* Notes that interrupts are off for this long, in which every message is lost: hears(). */
+/* Notes that interrupts are off for this long, in which every message is lost: hears(). Messages of a tick are heard at the
+ * beginning of the next one. So a callback blocks those that follow in the same tick, the main program those of the next. */
 static void block(uint64_t cycles) {
   enum { MOST = 65535 };
-  if (robot.blocked_at != (uint16_t)kilo_ticks) robot.blocked = 0;
-  robot.blocked_at = (uint16_t)kilo_ticks;
-  const uint64_t sum = robot.blocked + (cycles + KT_BLOCKED_UNIT - 1) / KT_BLOCKED_UNIT;
-  robot.blocked = (uint16_t)(sum < MOST ? sum : MOST);
+  const uint16_t at = (uint16_t)(kilo_ticks + (robot.in_interrupt ? 0 : 1));
+  uint64_t start = robot.blocked_at == at ? (uint64_t)robot.blocked * KT_BLOCKED_UNIT : 0;
+  if (robot.in_interrupt == KT_IN_RX && arrival() > start) start = arrival();
+  const uint64_t end = (start + cycles + KT_BLOCKED_UNIT - 1) / KT_BLOCKED_UNIT;
+  robot.blocked_at = at;
+  robot.blocked = (uint16_t)(end < MOST ? end : MOST);
 }
 
 /* Lets the main program wait for `cycles`. With KT_LOOP_PER_TICK it waits for whole ticks; remainders add up. A callback cannot
@@ -162,6 +190,7 @@ static uint32_t cycle_of_tick(void) {
 enum { FULL_DUTY = 255 };
 
 void set_motors(uint8_t left, uint8_t right) {
+  charge(SET_MOTORS_CYCLES);
   const uint8_t full = left == FULL_DUTY && right == FULL_DUTY;
   if (full != robot.full) {
     const uint32_t now = cycle_of_tick();
@@ -185,7 +214,10 @@ void spinup_motors(void) {
   delay(15);
 }
 
-void set_color(uint8_t color) { robot.led = color & 63; }
+void set_color(uint8_t color) {
+  charge(SET_COLOR_CYCLES);
+  robot.led = color & 63;
+}
 
 /* The EEPROM of an ATmega328P, 1024 octets. */
 uint8_t* kt_eeprom(void) {
@@ -278,6 +310,7 @@ uint8_t rand_hard(void) {
 static uint8_t soft_seed = 0xaa, soft_count;
 
 uint8_t rand_soft(void) {
+  charge(RAND_SOFT_CYCLES);
   uint8_t s = soft_seed;
   s ^= (uint8_t)(s << 3);
   s ^= s >> 5;
@@ -287,7 +320,10 @@ uint8_t rand_soft(void) {
 
 void rand_seed(uint8_t seed) { soft_seed = seed; }
 
-uint16_t message_crc(const message_t* message) { return kilotwin_message_crc((const uint8_t*)message); }
+uint16_t message_crc(const message_t* message) {
+  charge(MESSAGE_CRC_CYCLES);
+  return kilotwin_message_crc((const uint8_t*)message);
+}
 
 /* Distance beyond contact, mm, for a reading between entries i - 1 and i of a table; linear interpolation. */
 static uint8_t beyond_contact(const uint16_t* table, int i, int reading) {
@@ -304,6 +340,7 @@ static int first_below(const uint16_t* table, int reading, int none) {
 }
 
 uint8_t estimate_distance(const distance_measurement_t* distance) {
+  charge(ESTIMATE_DISTANCE_CYCLES);
   enum { BOTH_FROM = 700, LOW_ONLY_FROM = 900, TOO_FAR = 90 };
   const int high = distance->high_gain, low = distance->low_gain;
   int by_high = 0, by_low = 0;
@@ -424,6 +461,7 @@ void kilo_start(void (*setup)(void), void (*loop)(void)) {
         /* fall through */
       case RUNNING: {
         if (robot.loop_rate == KT_LOOP_AS_ON_ROBOT) {
+          charge(LOOP_CYCLES);
           loop();
           if (--robot.calls == 0) {
             robot.returned = 1;
@@ -562,18 +600,18 @@ static void boot_loader(uint8_t type) {
   if (type < BOOT || type > BOOTPGM_SIZE) robot.reset = 1;
 }
 
-/* Whether a message of this tick is heard, at a random time in it. One that overlaps a time with interrupts off is lost: its
- * bits are taken late. The overhead controller repeats its commands until one is heard. */
+/* Whether the message that is being received is heard. One that overlaps a time with interrupts off is lost: its bits are taken
+ * late. The overhead controller repeats its commands until one is heard. */
 static uint8_t hears(uint8_t type) {
   if (robot.blocked == 0 || type >= BOOT) return 1;
-  const uint64_t since = (uint16_t)((uint16_t)kilo_ticks - robot.blocked_at);
-  const uint64_t blocked = (uint64_t)robot.blocked * KT_BLOCKED_UNIT, passed = since * robot.tick_cycles;
-  if (passed >= blocked + robot.tick_cycles) {
+  const uint16_t after = (uint16_t)((uint16_t)kilo_ticks - robot.blocked_at);
+  const uint16_t since = after == 0xffff ? 0 : after; /* a tick in which the robot's clock did not advance */
+  const int64_t end = (int64_t)robot.blocked * KT_BLOCKED_UNIT - (int64_t)since * robot.tick_cycles;
+  if (end + PACKET_CYCLES <= 0) {
     robot.blocked = 0;
     return 1;
   }
-  const uint64_t left = since <= 1 ? blocked : blocked + robot.tick_cycles - passed;
-  return (noise() >> 11) % robot.tick_cycles >= left + PACKET_CYCLES;
+  return (int64_t)arrival() >= end + PACKET_CYCLES;
 }
 
 /* Messages after a RESET in the same tick are lost, because the robot is starting. */
@@ -582,8 +620,11 @@ static uint64_t interrupts(void) {
   robot.in_interrupt = KT_IN_TX_SUCCESS;
   if (events->sent) kilo_message_tx_success();
   robot.in_interrupt = KT_IN_RX;
+  arrivals.count = events->receptions;
+  arrivals.drawn = arrivals.cycle = 0;
   for (uint32_t i = 0; i < events->receptions && !robot.reset && !robot.deaf; ++i) {
     const struct KtReception* reception = &events->reception[i];
+    arrivals.index = i;
     __builtin_memcpy(&rx_msg, &reception->message, sizeof rx_msg);
     rx_dist.low_gain = reception->low_gain;
     rx_dist.high_gain = robot.trigger_lost ? robot.adc : reception->high_gain;

@@ -77,6 +77,8 @@ TEST(Compiler, MacrosThatAMakefileMayDefineAreNamed) {
                                           "static void loop(void) { set_motors(SPEED, WIDTH); missing = 1; }\n"
                                           "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
   EXPECT_TRUE(error_of({source}).ends_with("add --define SPEED=VALUE WIDTH=VALUE")) << error_of({source});
+  const std::string cpp = folder.write("p.cpp", os::read_file(source));
+  EXPECT_TRUE(error_of({cpp}).ends_with("add --define SPEED=VALUE WIDTH=VALUE")) << error_of({cpp});
 }
 
 TEST(Compiler, CodeOnTheStackIsRefusedAsForTheRobot) {

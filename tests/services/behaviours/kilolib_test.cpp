@@ -236,5 +236,35 @@ TEST(Kilolib, BuffersConnectCallbacksAndLoop) {
   EXPECT_EQ(swarm.frame().offer_message.at(0), message(7, 22));
 }
 
+TEST(Kilolib, ACallbackThatWaitsLosesTheMessagesOfThatTime) {
+  // One message per tick at a random time t of it. A callback of 30 ms blocks until t + 30 ms, and a packet takes 4.37 ms. So the
+  // next message is heard if it comes at least 1.6 ms later in its tick, the one after that always: a part of 0.64 is heard.
+  Swarm swarm({program("static uint8_t heard; static void rx(message_t* m, distance_measurement_t* d) { "
+                       "set_motors(++heard, 0); delay(30); }\nstatic void loop(void) {}")},
+              1);
+  swarm.start();
+  constexpr int kMessages = 250;
+  int heard = 0, last = swarm.frame().motor_left[0];
+  for (int n = 0; n < kMessages; ++n) {
+    Air air;
+    air.receptions = {{0, message(0)}};
+    swarm.step(air);
+    heard += (swarm.frame().motor_left[0] - last) & 255;
+    last = swarm.frame().motor_left[0];
+  }
+  EXPECT_NEAR(heard / double{kMessages}, 0.64, 0.07);
+}
+
+TEST(Kilolib, AShortCallbackLosesNoMessage) {
+  Swarm swarm({program("static uint8_t heard; static void rx(message_t* m, distance_measurement_t* d) { "
+                       "set_motors(++heard, 0); }\nstatic void loop(void) {}")},
+              1);
+  swarm.start();
+  Air air;
+  air.receptions = {{0, message(0)}, {0, message(1)}, {0, message(2)}};
+  for (int n = 0; n < 20; ++n) swarm.step(air);
+  EXPECT_EQ(swarm.frame().motor_left[0], 60);
+}
+
 }  // namespace
 }  // namespace kilotwin::behaviours::test

@@ -28,20 +28,43 @@ TEST(LoopRate, ACountThatSettlesTakesOneTick) {
   EXPECT_EQ(robot.frame().motor_left[0] - before, 10);
 }
 
-TEST(LoopRate, CallsThatChangeSomethingAreAllExecuted) {
-  // A call takes some tens of cycles of the 262144 of a tick.
-  Robot robot(
-      "static uint32_t n; static message_t m;\n"
-      "static message_t* tx(void) { memcpy(m.data, &n, 4); return &m; }\n"
-      "static void loop(void) { ++n; }\n");
-  robot.steps(20);
+/// Calls of a loop() that counts them and then does this, per tick of 262144 cycles.
+double calls_per_tick(const std::string& statement, const std::string& before = "") {
+  Robot robot(before +
+              "static uint32_t n; static message_t m, other; static volatile uint16_t v;\n"
+              "static message_t* tx(void) { memcpy(m.data, &n, 4); return &m; }\n"
+              "static void loop(void) { ++n; " +
+              statement + " }\n");
+  constexpr int kTicks = 20;
+  robot.steps(kTicks);
   Air air;
   air.ask = {0};
   robot.step(air);
   const IrMessage sent = robot.frame().offer_message.at(0);
-  const int calls = sent[0] | sent[1] << 8 | sent[2] << 16;
-  EXPECT_GT(calls, 20 * 2000);
-  EXPECT_LT(calls, 22 * 40000);
+  return (sent[0] | sent[1] << 8 | sent[2] << 16) / (kTicks + 1.5);
+}
+
+TEST(LoopRate, CallsThatChangeSomethingAreAllExecuted) {
+  // As firmware a call of ++n takes 47 cycles.
+  EXPECT_NEAR(calls_per_tick(""), 262144 / 47, 0.25 * 262144 / 47);
+}
+
+TEST(LoopRate, TextThatNobodyReadsTakesNoTime) {
+  // As on the robot, where printf() returns at once before debug_init().
+  const std::string print = "printf(\"%d: %ld of %ld\\n\", 1234, (long)n, (long)n);";
+  const double plain = 262144 / calls_per_tick("", "#include <stdio.h>\n");
+  const double printed = 262144 / calls_per_tick(print, "#include <stdio.h>\n") - plain;
+  EXPECT_GT(printed, 60);
+  EXPECT_LT(printed, 250);  // with the arguments
+  const std::string serial = "#define DEBUG\n#include \"debug.h\"\nstatic void setup(void) { debug_init(); }\n";
+  EXPECT_GT(262144 / calls_per_tick(print, serial), 15 * 2083);  // a line of 17 octets at 38400 baud
+}
+
+TEST(LoopRate, FunctionsOfKilolibTakeTheirTime) {
+  const double plain = 262144 / calls_per_tick("");
+  const auto cycles = [&](const std::string& statement) { return 262144 / calls_per_tick(statement) - plain; };
+  EXPECT_NEAR(cycles("set_motors(n, n);"), 20, 15);
+  EXPECT_NEAR(cycles("v = message_crc(&other);"), 400, 60);
 }
 
 TEST(LoopRate, MessagesAreSeenOnceEach) {

@@ -42,10 +42,28 @@ TEST(RobotInt, WrapsLikeTheRobots) {
   EXPECT_TRUE(holds("struct { int x; } s = {32767}, *p = &s; p->x++;", "s.x == -32768"));
 }
 
+TEST(RobotInt, UnsignedHas16BitsAndLong32) {
+  EXPECT_TRUE(
+      holds("volatile unsigned a = 65535; a += 10; volatile unsigned int b = 70000;", "a == 9 && b == 4464"));
+  EXPECT_TRUE(holds("volatile long a = 2147483647L; a += 1; volatile unsigned long b = 4294967295UL; ++b;",
+                    "a < 0 && b == 0"));
+  EXPECT_TRUE(holds("volatile long int a = 65536; a = a * a;", "a == 0"));
+  EXPECT_TRUE(holds("volatile uint32_t x = 5000000; x = x * 1000UL / 1000;", "x == 5000000UL * 1000 / 1000"));
+  EXPECT_TRUE(holds("volatile unsigned long a = 1; long long b = 1LL << 40; double d = 1.5L;",
+                    "sizeof a == 4 && sizeof b == 8 && b > 0x7fffffffL && d == 1.5 && sizeof(unsigned) == 2"));
+  EXPECT_TRUE(holds("struct { unsigned long state, other; } r = {1, 7}; rand_r(&r.state); random_r(&r.state);",
+                    "r.other == 7 && r.state != 1"));
+  // What goes into a message or the EEPROM has the robot's layout.
+  EXPECT_TRUE(holds("struct { unsigned id; long seen; unsigned int near : 1; uint8_t last; } s;", "sizeof s == 8"));
+  EXPECT_TRUE(
+      holds("char t[20]; long a = -70000; unsigned long b = 70000; unsigned c = 7;"
+            "snprintf(t, sizeof t, \"%ld %lu %u\", a, b, c);",
+            "strcmp(t, \"-70000 70000 7\") == 0", "#include <stdio.h>"));
+}
+
 TEST(RobotInt, LeavesOtherTypesAlone) {
   EXPECT_TRUE(holds("volatile int32_t a = 40000; a += 40000;", "a == 80000"));
   EXPECT_TRUE(holds("volatile long a = 40000; a *= 2;", "a == 80000"));
-  EXPECT_TRUE(holds("volatile unsigned a = 65535; a += 10; volatile unsigned int b = 70000;", "a - b != 0"));
   EXPECT_TRUE(holds("float f = 1e6; f += 0.5; f *= 2; double d = 1; d += 0.25;", "f == 2000001.0f && d == 1.25"));
   EXPECT_TRUE(holds("uint8_t u = 250; u += 10; char c = 3; c++;", "u == 4 && c == 4"));
   EXPECT_TRUE(holds("int a[3] = {1, 2, 3}, *p = a; p += 2; p -= 1; ++p;", "*p == 3 && sizeof(int) == 2"));
@@ -111,6 +129,9 @@ TEST(RobotInt, SurvivesAnyText) {
                                 "\"",
                                 "'",
                                 "unsigned",
+                                "long",
+                                "7L",
+                                "1.5",
                                 "for",
                                 "if",
                                 "->",

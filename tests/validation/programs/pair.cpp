@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <regex>
 #include <sstream>
 
 #include "clients/recorder/reader.hpp"
-#include "clients/recorder/statistics.hpp"
 #include "core/os/files.hpp"
 #include "tests/validation/runs.hpp"
 
@@ -20,18 +20,18 @@ namespace fs = std::filesystem;
 std::string experiment(const PairSettings& settings, const fs::path& program, bool avr, int seed) {
   return fmt::format(
       "duration_s: {} seed: {} arena {{ width_mm: 4000 height_mm: 4000 }} motion {{ noise: false }}\n"
-      "radio {{ range_mm: 120 }} light {{ ambient: 20 source {{ x_mm: 400 y_mm: 300 intensity: 60 }} }}\n"
+      "radio {{ range_mm: 120 }} light {{ {} }}\n"
       "recording {{ event: LED event: MOTION event: SENT event: RECEIVED }}\n"
       "robots {{ count: {} behaviour: \"{}\" {} layout {{ grid {{ pitch_mm: 60 }} }} }}\n",
-      settings.duration_s, seed, settings.robots, fs::absolute(program).string(), avr ? "avr: true" : "",
-      settings.robots);
+      settings.duration_s, seed, settings.light, settings.robots, fs::absolute(program).string(),
+      avr ? "avr: true" : "", settings.robots);
 }
 
-/// The first line of a log that contains `word`.
-std::string line_with(const std::string& log, const std::string& word) {
+/// The first line of a log with a match of `form`.
+std::string line_with(const std::string& log, const std::regex& form) {
   std::istringstream lines(log);
   for (std::string line; std::getline(lines, line);) {
-    if (line.find(word) != std::string::npos) return line;
+    if (std::regex_search(line, form)) return line;
   }
   return "";
 }
@@ -93,35 +93,13 @@ void read_run(const fs::path& file, int robots, Outcome& outcome) {
   }
 }
 
-/// Number of changes that agree in order, at most one tick apart. Changes in the last two ticks are left out.
-void count_changes(const std::vector<std::vector<Change>>& native, const std::vector<std::vector<Change>>& firmware,
-                   std::int64_t last, Comparison& result) {
-  for (std::size_t robot = 0; robot < native.size(); ++robot) {
-    const auto ends = [last](const std::vector<Change>& changes) {
-      std::size_t n = changes.size();
-      while (n > 0 && changes[n - 1].tick >= last - 1) --n;
-      return n;
-    };
-    const std::size_t a = ends(native[robot]), b = ends(firmware[robot]);
-    result.native_changes += a;
-    result.firmware_changes += b;
-    for (std::size_t i = 0, j = 0; i < a && j < b;) {
-      const Change &one = native[robot][i], &other = firmware[robot][j];
-      if (one.value == other.value && std::abs(one.tick - other.tick) <= 1)
-        ++result.same_changes, ++i, ++j;
-      else if (one.tick <= other.tick)
-        ++i;
-      else
-        ++j;
-    }
-  }
-}
-
 }  // namespace
 
-Outcome run_program(const PairSettings& settings, const fs::path& program, bool avr) {
-  Outcome outcome;
-  for (int seed = 1; seed <= settings.seeds; ++seed) {
+void run_program(const PairSettings& settings, const fs::path& program, bool avr, int first_seed, int last_seed,
+                 Outcome& outcome) {
+  static const std::regex kWarning("robot [0-9]+ at "), kError("error");
+  outcome.robots = static_cast<std::size_t>(settings.robots);
+  for (int seed = first_seed; seed <= last_seed; ++seed) {
     const fs::path base = settings.scratch / fmt::format("{}-{}-{}", program.stem().string(), avr, seed);
     const fs::path file = base.string() + ".txtpb", log = base.string() + ".log";
     std::ofstream(file) << experiment(settings, program, avr, seed);
@@ -129,57 +107,16 @@ Outcome run_program(const PairSettings& settings, const fs::path& program, bool 
                                   "--threads", "1", "--force", "--out", base.string()},
                                  log);
     const std::string said = os::read_file(log);
-    if (outcome.warning.empty()) outcome.warning = line_with(said, "robot ");
+    if (outcome.warning.empty()) outcome.warning = line_with(said, kWarning);
     if (!ran) {
-      outcome.refusal = line_with(said, "error");
+      outcome.refusal = line_with(said, kError);
       if (outcome.refusal.empty()) outcome.refusal = said.substr(0, said.find('\n'));
       if (outcome.refusal.empty()) outcome.refusal = "it took more than ten minutes";
-      return outcome;
+      return;
     }
     read_run(base / "recording.ktrec", settings.robots, outcome);
     fs::remove_all(base);
   }
-  return outcome;
-}
-
-Comparison compare(const Outcome& native, const Outcome& firmware) {
-  Comparison result;
-  count_changes(native.motors, firmware.motors, native.last_tick, result);
-  count_changes(native.led, firmware.led, native.last_tick, result);
-  result.event_exact = result.same_changes == result.native_changes &&
-                       result.same_changes == result.firmware_changes && native.sent == firmware.sent &&
-                       native.received == firmware.received;
-  struct Measure {
-    const char* name;
-    std::vector<double> Outcome::*values;
-    double least;  ///< a difference below this does not count
-  };
-  static constexpr std::array kMeasures{Measure{"path, mm", &Outcome::path_mm, 5},
-                                        Measure{"distance, mm", &Outcome::distance_mm, 5},
-                                        Measure{"LED's brightness", &Outcome::brightness, 0.01},
-                                        Measure{"changes of LED", &Outcome::colours, 1},
-                                        Measure{"messages sent", &Outcome::sent, 1},
-                                        Measure{"messages received", &Outcome::received, 2}};
-  result.agrees = true;
-  double worst = -1;
-  for (const Measure& measure : kMeasures) {
-    recorder::Sample a, b;
-    for (const double value : native.*measure.values) a.add(value);
-    for (const double value : firmware.*measure.values) b.add(value);
-    const double difference = std::abs(a.mean() - b.mean());
-    const double errors = std::hypot(a.standard_error(), b.standard_error());
-    const double part = difference <= measure.least ? 0 : difference / std::max(std::abs(b.mean()), measure.least);
-    const bool agrees = part <= 0.1 || difference <= 2 * errors;
-    result.agrees = result.agrees && agrees;
-    const double rank = agrees ? part / 1e6 : part;
-    if (rank <= worst) continue;
-    worst = rank;
-    result.measure = measure.name;
-    result.native = a.mean();
-    result.firmware = b.mean();
-    result.part = part;
-  }
-  return result;
 }
 
 }  // namespace kilotwin::validation

@@ -10,14 +10,15 @@
 #define SHRT_MAX __SHRT_MAX__
 #define SHRT_MIN (-SHRT_MAX - 1)
 #define USHRT_MAX (2 * SHRT_MAX + 1)
-#ifdef KILOTWIN_ROBOT_INT /* services/behaviours/robot_int.hpp: int has 16 bits, unsigned int has 32 */
+#ifdef KILOTWIN_ROBOT_INT /* services/behaviours/robot_int.hpp: int has 16 bits, long has 32 */
 #define INT_MAX __SHRT_MAX__
+#define LONG_MAX __INT_MAX__
 #else
 #define INT_MAX __INT_MAX__
+#define LONG_MAX __LONG_MAX__
 #endif
 #define INT_MIN (-INT_MAX - 1)
-#define UINT_MAX (2U * __INT_MAX__ + 1U)
-#define LONG_MAX __LONG_MAX__
+#define UINT_MAX (2U * INT_MAX + 1U)
 #define LONG_MIN (-LONG_MAX - 1L)
 #define ULONG_MAX (2UL * LONG_MAX + 1UL)
 #define LLONG_MAX __LONG_LONG_MAX__
