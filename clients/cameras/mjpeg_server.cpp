@@ -8,7 +8,7 @@
 #include <mutex>
 #include <string_view>
 
-#include "clients/http/loopback_server.hpp"
+#include "clients/http/server.hpp"
 
 namespace kilotwin::cameras {
 namespace {
@@ -181,7 +181,7 @@ class MjpegServer::Service {
   std::atomic<std::uint32_t> streams_{0};
   std::mutex mutex_;
   PostedPicture newest_;  // guarded by mutex_
-  http::LoopbackServer server_;
+  http::Server server_;
 };
 
 MjpegServer::MjpegServer(std::uint16_t port) : service_(std::make_unique<Service>(port)) {}

@@ -144,7 +144,7 @@ void require_no_job(const fs::path& directory) {
         job, directory.string(), job_file(directory).string()));
   JobWatch watch(squeue, job);
   std::optional<bool> queued = watch.in_queue();
-  for (; !queued; queued = watch.in_queue()) std::this_thread::sleep_for(kPoll);
+  for (; !queued; queued = watch.in_queue()) std::this_thread::sleep_for(kQueuePoll);
   if (*queued)
     throw UserError(
         fmt::format("--resume: job {} of Slurm is still in the queue and does these runs; wait for its end, or end "

@@ -13,7 +13,7 @@
 #include <string_view>
 #include <vector>
 
-#include "clients/http/loopback_server.hpp"
+#include "clients/http/server.hpp"
 #include "clients/view/run_text.hpp"
 #include "core/base/error.hpp"
 
@@ -104,14 +104,6 @@ struct Session {
   Viewer* viewer;
 };
 
-bool is_allowed(lws* connection) {
-  if (!http::names_this_machine(connection)) return false;
-  // Browsers always state the origin of a page that opens a WebSocket; other programs have none.
-  const std::string origin = http::header_of(connection, WSI_TOKEN_ORIGIN);
-  return lws_hdr_total_length(connection, WSI_TOKEN_ORIGIN) == 0 ||
-         origin == "http://" + http::header_of(connection, WSI_TOKEN_HOST);
-}
-
 /// Takes the same time for every wrong token.
 bool equal_tokens(std::string_view a, std::string_view b) {
   if (a.size() != b.size()) return false;
@@ -124,13 +116,13 @@ bool equal_tokens(std::string_view a, std::string_view b) {
 
 class Gateway::Service {
  public:
-  Service(std::uint16_t port, std::string token, PageFiles page)
+  Service(const http::Endpoint& endpoint, std::string token, PageFiles page)
       : token_(std::move(token)),
         page_(std::move(page)),
-        server_(port, wanted(this),
-                fmt::format(
-                    "--port {}: cannot be served on 127.0.0.1; choose a port that is free, or leave the option out",
-                    port)) {}
+        server_(
+            endpoint, wanted(this),
+            fmt::format("--port {}: cannot be served on {}; choose a port that is free, or leave the option out",
+                        endpoint.port, endpoint.host)) {}
   Service(const Service&) = delete;
 
   void show(Answers& answers, std::string run_text) {
@@ -153,7 +145,7 @@ class Gateway::Service {
   }
 
   [[nodiscard]] std::uint16_t port() const { return server_.port(); }
-  [[nodiscard]] const std::string& token() const { return token_; }
+  [[nodiscard]] std::string address() const { return fmt::format("{}/#token={}", server_.origin(), token_); }
   [[nodiscard]] Traffic traffic() const { return {viewers_, frames_, bytes_, refused_}; }
 
   Newest run_, status_, frame_;  // guarded by mutex_
@@ -199,8 +191,8 @@ class Gateway::Service {
   }
 
   int begin_file(lws* connection, Download& download, const std::string& path) {
-    if (!http::names_this_machine(connection))
-      return refuse(connection, HTTP_STATUS_FORBIDDEN, "open the page as http://127.0.0.1");
+    if (!server_.is_named_by(connection))
+      return refuse(connection, HTTP_STATUS_FORBIDDEN, ("open the page as " + server_.origin()).c_str());
     if (lws_hdr_total_length(connection, WSI_TOKEN_GET_URI) == 0)
       return refuse(connection, HTTP_STATUS_METHOD_NOT_ALLOWED, "only GET");
     const PageFile* const file = page_.find(path);
@@ -247,7 +239,9 @@ class Gateway::Service {
     auto* const session = static_cast<Session*>(user);
     switch (reason) {
       case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
-        if (is_allowed(connection) && service.viewers_ < kMostViewers) return 0;
+        if (service.server_.is_named_by(connection) && service.server_.is_own_page(connection) &&
+            service.viewers_ < kMostViewers)
+          return 0;
         ++service.refused_;
         return -1;
       case LWS_CALLBACK_ESTABLISHED:
@@ -440,16 +434,14 @@ class Gateway::Service {
   std::mutex answering_;        // held during calls of answers_
   Answers* answers_ = nullptr;  // guarded by answering_
   std::atomic<bool> has_answers_{false};
-  http::LoopbackServer server_;
+  http::Server server_;
 };
 
-Gateway::Gateway(std::uint16_t port, std::string token, PageFiles page)
-    : service_(std::make_unique<Service>(port, std::move(token), std::move(page))) {}
+Gateway::Gateway(const http::Endpoint& endpoint, std::string token, PageFiles page)
+    : service_(std::make_unique<Service>(endpoint, std::move(token), std::move(page))) {}
 Gateway::~Gateway() = default;
 std::uint16_t Gateway::port() const { return service_->port(); }
-std::string Gateway::address() const {
-  return fmt::format("http://127.0.0.1:{}/#token={}", service_->port(), service_->token());
-}
+std::string Gateway::address() const { return service_->address(); }
 void Gateway::show(Answers& answers, std::string run_text) { service_->show(answers, std::move(run_text)); }
 void Gateway::post_status(std::string text) { service_->post(&Service::status_, std::move(text)); }
 void Gateway::post_frame(std::string frame) { service_->post(&Service::frame_, std::move(frame)); }

@@ -1,4 +1,4 @@
-/// Gateway: the page over HTTP and runs over a WebSocket, on 127.0.0.1.
+/// Gateway: the page over HTTP and runs over a WebSocket, on 127.0.0.1 or, with TLS, on an address that other machines reach.
 ///
 /// A viewer gets text messages, JSON objects with a `type`, and binary frames (frame_code.hpp); it sends requests (request.hpp).
 /// A viewer gets one frame per request, so a slow one gets fewer frames, and one that stalls gets none. Requests that it has not
@@ -8,7 +8,7 @@
 /// One thread answers. Next is the viewer whose answers have taken least time, so one that asks expensive questions waits for the
 /// others, and they wait for one of its answers at most.
 ///
-/// Browsers let pages of any origin open a WebSocket. The gateway therefore serves only requests whose `Host` is this machine
+/// Browsers let pages of any origin open a WebSocket. The gateway therefore serves only requests whose `Host` is its own
 /// and whose `Origin` is the page's own. To steer a run, a viewer shows the token that its address carries.
 #pragma once
 
@@ -17,6 +17,7 @@
 #include <optional>
 #include <string>
 
+#include "clients/http/endpoint.hpp"
 #include "clients/view/page_files.hpp"
 #include "clients/view/request.hpp"
 
@@ -58,9 +59,8 @@ class Gateway {
     std::uint64_t frames = 0, bytes = 0, refused = 0;  ///< since the start; refused: connections and broken rules
   };
 
-  /// Serves from a thread of its own. Port 0: one that is free. `token`: 16 characters or more. Throws UserError where the port
-  /// is taken.
-  Gateway(std::uint16_t port, std::string token, PageFiles page);
+  /// Serves from a thread of its own. `token`: 16 characters or more. Throws UserError where the endpoint cannot be served.
+  Gateway(const http::Endpoint& endpoint, std::string token, PageFiles page);
   ~Gateway();
   Gateway(const Gateway&) = delete;
 

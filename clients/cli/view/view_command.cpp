@@ -28,6 +28,14 @@ struct ViewArguments {
   dds::Transport transport;
   std::optional<std::uint16_t> port;
   bool foxglove = false;
+  http::Endpoint endpoint;           ///< without the port
+  std::vector<std::string> origins;  ///< of viewers, with --foxglove
+
+  [[nodiscard]] http::Endpoint endpoint_or(std::uint16_t usual_port) const {
+    http::Endpoint at = endpoint;
+    at.port = port.value_or(usual_port);
+    return at;
+  }
 };
 
 /// How often a recording is looked at for new states.
@@ -49,7 +57,7 @@ class Viewing {
     view::PageFiles page = view::PageFiles::of_this_program();
     if (!page.built())
       warn("kilotwin: the page was not built, its address says how; building it needs scripts/setup");
-    gateway_ = std::make_unique<view::Gateway>(arguments.port.value_or(0), view::random_token(), std::move(page));
+    gateway_ = std::make_unique<view::Gateway>(arguments.endpoint_or(0), view::random_token(), std::move(page));
     say("kilotwin: open " + gateway_->address());
     if (recorded_) show_recording();
   }
@@ -92,10 +100,9 @@ int serve_foxglove(const ViewArguments& arguments) {
         "view: --foxglove shows live runs; give --domain N. For a recorded one: kilotwin export RUN --mcap FILE");
   dds::Transport transport = arguments.transport;
   transport.domain = *arguments.domain;
-  foxglove::Server server(arguments.port.value_or(foxglove::kUsualPort));
-  say(fmt::format(
-      "kilotwin: open ws://127.0.0.1:{} in Foxglove or Lichtblick, as a Foxglove WebSocket; Ctrl-C ends",
-      server.port()));
+  foxglove::Server server(arguments.endpoint_or(foxglove::kUsualPort), arguments.origins);
+  say(fmt::format("kilotwin: open {}://{}:{} in Foxglove or Lichtblick, as a Foxglove WebSocket; Ctrl-C ends",
+                  arguments.endpoint.encrypted() ? "wss" : "ws", arguments.endpoint.host, server.port()));
   foxglove::LiveTopics live(transport, server);
   while (interrupted() == 0) live.serve();
   return kDone;
@@ -104,6 +111,9 @@ int serve_foxglove(const ViewArguments& arguments) {
 int show(const ViewArguments& arguments) {
   if (arguments.run.empty() && !arguments.domain)
     throw UserError("view: give RUN, the directory of a run, or --domain N, the domain of a live one");
+  if (!arguments.origins.empty() && !arguments.foxglove)
+    throw UserError("view: --origin admits pages of viewers; give --foxglove, or leave it out");
+  arguments.endpoint.check();
   catch_interrupts();
   static_cast<void>(::setpriority(PRIO_PROCESS, 0, kNiceness));
   return arguments.foxglove ? serve_foxglove(arguments) : Viewing(arguments).work();
@@ -127,12 +137,24 @@ Command add_view(CLI::App& program) {
          "address of a machine of the run; give each of them, this machine too (default: all on this machine)")
       ->allow_extra_args(false)
       ->type_name("ADDRESS");
-  app.add_option(
-         "--port", arguments->port,
-         "port of 127.0.0.1 for the page (default: one that is free; with --foxglove 8765); 0: one that is free")
+  app.add_option("--port", arguments->port,
+                 "port for the page (default: one that is free; with --foxglove 8765); 0: one that is free")
       ->type_name("P");
+  app.add_option(
+         "--listen", arguments->endpoint.host,
+         "IPv4 address or name of this machine, as it stands in the page's address; other machines need TLS: "
+         "--certificate and --key")
+      ->capture_default_str()
+      ->type_name("ADDRESS");
+  app.add_option("--certificate", arguments->endpoint.certificate, "serve with TLS: PEM file of the certificate")
+      ->type_name("FILE");
+  app.add_option("--key", arguments->endpoint.key, "PEM file of its private key")->type_name("FILE");
   app.add_flag("--foxglove", arguments->foxglove,
                "serve live runs by the Foxglove WebSocket protocol in place of the page");
+  app.add_option("--origin", arguments->origins,
+                 "with --foxglove: a further origin whose pages may connect, such as https://viewer.example")
+      ->allow_extra_args(false)
+      ->type_name("ORIGIN");
   app.footer(
       "Example: kilotwin view runs/disperse-1. Open the address that it prints. The token in it allows to steer a "
       "live run.");

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <deque>
@@ -10,10 +11,11 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string_view>
 #include <utility>
 #include <vector>
 
-#include "clients/http/loopback_server.hpp"
+#include "clients/http/server.hpp"
 #include "core/base/base64.hpp"
 #include "core/base/error.hpp"
 
@@ -62,13 +64,30 @@ struct Session {
   Viewer* viewer;
 };
 
+/// Where the viewers' pages come from: Foxglove, Lichtblick, and programs of the desktop, whose pages are files.
+constexpr std::array<std::string_view, 4> kViewers{"https://app.foxglove.dev", "https://studio.foxglove.dev",
+                                                   "https://lichtblick-suite.github.io", "file://"};
+
+/// Whether a page comes from a server of this machine.
+bool is_local(std::string_view origin) {
+  for (const std::string_view scheme : {"http://", "https://"}) {
+    if (!origin.starts_with(scheme)) continue;
+    const std::string_view host = origin.substr(scheme.size());
+    const std::string_view name = host.substr(0, host.find(':'));
+    return name == "localhost" || name == "127.0.0.1";
+  }
+  return false;
+}
+
 }  // namespace
 
 class Server::Service {
  public:
-  explicit Service(std::uint16_t port)
-      : server_(port, wanted(this),
-                fmt::format("--port {}: cannot be served on 127.0.0.1; choose a port that is free, or 0", port)) {}
+  Service(const http::Endpoint& endpoint, std::vector<std::string> origins)
+      : origins_(std::move(origins)),
+        server_(endpoint, wanted(this),
+                fmt::format("--port {}: cannot be served on {}; choose a port that is free, or 0", endpoint.port,
+                            endpoint.host)) {}
 
   void begin(std::string session) {
     {
@@ -130,7 +149,7 @@ class Server::Service {
     auto* const session = static_cast<Session*>(user);
     switch (reason) {
       case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
-        return http::names_this_machine(connection) && service.viewers_ < kMostViewers ? 0 : -1;
+        return service.admits(connection) && service.viewers_ < kMostViewers ? 0 : -1;
       case LWS_CALLBACK_ESTABLISHED:
         session->viewer = new Viewer;
         ++service.viewers_;
@@ -150,6 +169,15 @@ class Server::Service {
         return 0;
       default: return 0;
     }
+  }
+
+  [[nodiscard]] bool admits(lws* connection) const {
+    if (!server_.is_named_by(connection)) return false;
+    const std::string origin = http::header_of(connection, WSI_TOKEN_ORIGIN);
+    const auto is_it = [&origin](std::string_view other) { return origin == other; };
+    return http::has_no_origin(connection) || is_local(origin) ||
+           std::any_of(kViewers.begin(), kViewers.end(), is_it) ||
+           std::any_of(origins_.begin(), origins_.end(), is_it);
   }
 
   int receive(lws* connection, Viewer& viewer, std::string_view part) {
@@ -265,6 +293,7 @@ class Server::Service {
     return {};
   }
 
+  const std::vector<std::string> origins_;
   std::mutex mutex_;
   // Guarded by mutex_.
   std::string name_;
@@ -274,10 +303,11 @@ class Server::Service {
   std::vector<Channel> channels_;
 
   std::atomic<std::uint32_t> viewers_{0};
-  http::LoopbackServer server_;
+  http::Server server_;
 };
 
-Server::Server(std::uint16_t port) : service_(std::make_unique<Service>(port)) {}
+Server::Server(const http::Endpoint& endpoint, std::vector<std::string> origins)
+    : service_(std::make_unique<Service>(endpoint, std::move(origins))) {}
 Server::~Server() = default;
 void Server::begin(std::string session) { service_->begin(std::move(session)); }
 std::uint16_t Server::add_channel(std::string_view topic, std::string_view schema_name, std::string_view schema,

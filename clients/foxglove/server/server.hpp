@@ -1,18 +1,23 @@
-/// Server of the Foxglove WebSocket protocol, version 1, on 127.0.0.1. Foxglove and Lichtblick connect to it: "Open connection",
+/// Server of the Foxglove WebSocket protocol, version 1. Foxglove and Lichtblick connect to it: "Open connection",
 /// "Foxglove WebSocket". It speaks under the protocol's two names, foxglove.websocket.v1 and foxglove.sdk.v1.
 ///
 /// Viewers can only look. A slow one gets fewer messages: of each channel the newest that matter. What waits for it is bounded, and
 /// no viewer delays write() or another viewer. One that breaks the rules is disconnected: a message that is too long or no JSON,
-/// or too many subscriptions. A connection whose `Host` is not this machine is refused; pages of any origin may look, since
-/// viewers are pages of other origins.
+/// or too many subscriptions.
+///
+/// Browsers let pages of any origin open a WebSocket. The server therefore refuses connections whose `Host` is not its own, and
+/// pages other than those of Foxglove, of Lichtblick, of this machine, and of the origins that it was given. A sandboxed page has
+/// the origin "null": it is refused.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "clients/foxglove/topics.hpp"
+#include "clients/http/endpoint.hpp"
 
 namespace kilotwin::foxglove {
 
@@ -22,8 +27,9 @@ inline constexpr std::size_t kMostSubscriptions = 256, kLongestRequest_bytes = 6
 
 class Server final : public Sink {
  public:
-  /// Serves from a thread of its own. Port 0: one that is free. Throws UserError where the port is taken.
-  explicit Server(std::uint16_t port);
+  /// Serves from a thread of its own. `origins`: of further viewers, such as "https://viewer.example". Throws UserError where the
+  /// endpoint cannot be served.
+  explicit Server(const http::Endpoint& endpoint, std::vector<std::string> origins = {});
   ~Server() override;
   Server(const Server&) = delete;
 

@@ -20,7 +20,7 @@ export class Connection {
 
   constructor(listener: Listener) {
     this.#listener = listener;
-    this.#address = `ws://${location.host}/`;
+    this.#address = `${location.protocol === "https:" ? "wss:" : "ws:"}//${location.host}/`;
     this.#open();
   }
 

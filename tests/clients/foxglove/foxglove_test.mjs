@@ -67,7 +67,7 @@ const run = (name, robots) =>
   start([kilotwin, "run", path.join(sources, "experiments/disperse.txtpb"), "--robots", String(robots), "--duration", "600",
     "--pace", "1", "--quiet", "--domain", domain, "--out", path.join(scratch, name)]);
 
-const served = start([view, "view", "--domain", domain, "--foxglove", "--port", "0"]);
+const served = start([view, "view", "--domain", domain, "--foxglove", "--port", "0", "--origin", "https://viewer.example"]);
 const url = (await served.says(/ws:\/\/127\.0\.0\.1:\d+/))[0];
 
 /** A viewer that subscribes to all channels and collects what comes. */
@@ -133,9 +133,20 @@ try {
     bad.send(text);
     await closed;
   }
-  // Host names of other machines are refused.
-  const foreign = new WebSocket(url, ["foxglove.websocket.v1"], { headers: { Host: "example.org" } });
-  await new Promise((done) => foreign.on("error", done));
+  // Host names of other machines are refused, and pages that are not of a viewer, of this machine, or of --origin.
+  const admitted = (headers) =>
+    new Promise((done) => {
+      const socket = new WebSocket(url, ["foxglove.websocket.v1"], { headers });
+      socket.on("error", () => done(false));
+      socket.on("open", () => done(socket.close() ?? true));
+    });
+  assert.equal(await admitted({ Host: "example.org" }), false);
+  for (const origin of ["https://app.foxglove.dev", "https://lichtblick-suite.github.io", "http://localhost:8080", "file://",
+    "https://viewer.example"])
+    assert.equal(await admitted({ Origin: origin }), true, origin);
+  for (const origin of ["https://example.org", "null", "http://localhost.example.org", "https://app.foxglove.dev.example.org",
+    "https://viewer.example:444", `https://${"x".repeat(300)}`])
+    assert.equal(await admitted({ Origin: origin }), false, origin);
   const known = first.messages["/poses"].length;
   await first.until("more states", () => first.messages["/poses"].length > known + 3);
 

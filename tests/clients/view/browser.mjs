@@ -33,7 +33,7 @@ export class Served {
     served.address = await new Promise((resolve, reject) => {
       served.process.stderr.on("data", (data) => {
         served.text += data;
-        const found = /kilotwin: open (http:\S+)/.exec(served.text);
+        const found = /kilotwin: open (https?:\S+)/.exec(served.text);
         if (found) resolve(found[1]);
       });
       served.process.on("exit", () => reject(new Error(`ended before it printed an address: ${served.text}`)));

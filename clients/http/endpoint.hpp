@@ -1,0 +1,25 @@
+/// Endpoint: where a server listens, and how.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+namespace kilotwin::http {
+
+struct Endpoint {
+  Endpoint(std::uint16_t at = 0) : port(at) {}  // NOLINT: a port of this machine alone
+  std::uint16_t port;                           ///< 0: one that is free
+  std::string host = "127.0.0.1";  ///< IPv4 address or name of this machine, as it stands in the page's address
+  /// PEM files: the chain of certificates and its private key. Both, or neither: then it serves without TLS.
+  std::filesystem::path certificate, key;
+
+  [[nodiscard]] bool encrypted() const { return !certificate.empty(); }
+  /// Whether the host is a loopback address, or localhost.
+  [[nodiscard]] bool is_loopback() const { return host == "localhost" || host.starts_with("127."); }
+  /// Throws UserError, with the options --listen, --certificate and --key of `kilotwin view`, where other machines could connect
+  /// without TLS, where a file cannot be read, or where the host cannot stand in an address.
+  void check() const;
+};
+
+}  // namespace kilotwin::http
