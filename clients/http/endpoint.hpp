@@ -17,8 +17,8 @@ struct Endpoint {
   [[nodiscard]] bool encrypted() const { return !certificate.empty(); }
   /// Whether the host is a loopback address, or localhost.
   [[nodiscard]] bool is_loopback() const { return host == "localhost" || host.starts_with("127."); }
-  /// Throws UserError, with the options --listen, --certificate and --key of `kilotwin view`, where other machines could connect
-  /// without TLS, where a file cannot be read, or where the host cannot stand in an address.
+  /// Throws UserError if other machines could connect without TLS; if a file cannot be read; or if the host cannot stand in an
+  /// address. It names the options --listen, --certificate and --key of `kilotwin view`.
   void check() const;
 };
 

@@ -5,8 +5,8 @@
 /// no viewer delays write() or another viewer. One that breaks the rules is disconnected: a message that is too long or no JSON,
 /// or too many subscriptions.
 ///
-/// Browsers let pages of any origin open a WebSocket. The server therefore refuses connections whose `Host` is not its own, and
-/// pages other than those of Foxglove, of Lichtblick, of this machine, and of the origins that it was given. A sandboxed page has
+/// Browsers let pages of any origin open a WebSocket. The server therefore refuses connections whose `Host` is not its own.
+/// It serves the pages of Foxglove, of Lichtblick, of this machine, and of the origins that it was given, and no others. A sandboxed page has
 /// the origin "null": it is refused.
 #pragma once
 
