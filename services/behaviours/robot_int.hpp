@@ -7,7 +7,7 @@
 
 namespace kilotwin::behaviours {
 
-/// Replaces `int` by `short`, `unsigned` by `unsigned short` and `long` by `int` in preprocessed C. Headers of the runtime and of
+/// Replaces `int` by `short`, `unsigned` by `unsigned short` and `long` by `int` in preprocessed text. Headers of the runtime and of
 /// the compiler keep theirs, and so do types with short, char or two times long. Literals lose a single L. Sums, differences and products are still computed with 32 bits. Where one is stored in an int, by =,
 /// +=, -=, *=, ++ or --, or as initial value, the text gets a test that calls kilotwin_overflow() if 16 bits do not hold it.
 /// Lines keep their numbers. Text that the parser does not understand stays without tests.
