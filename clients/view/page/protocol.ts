@@ -74,6 +74,12 @@ export interface Floor {
   circles: (Circle & { rgba: string })[];
 }
 
+/** Circles that are drawn: those on floors, and those of the experiment that no floor draws around the same centre. */
+export function spotsOf(run: Run, floors: Floor[]): Circle[] {
+  const painted = floors.flatMap((floor) => floor.circles);
+  return [...run.circles.filter((spot) => !painted.some(({ x, y }) => Math.hypot(x - spot.x, y - spot.y) < 1)), ...painted];
+}
+
 export interface RobotCounts {
   type: "robot";
   robot: number;

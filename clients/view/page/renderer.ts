@@ -3,7 +3,7 @@ import type { Camera } from "./camera.ts";
 import { GRID_PX, Triangles, circle, outline, roundStep, type Colour, type Point } from "./geometry.ts";
 import { FLOATS } from "./flights.ts";
 import { bordersOf } from "./partitions.ts";
-import type { Floor, Frame, LightText, Run } from "./protocol.ts";
+import { spotsOf, type Floor, type Frame, type LightText, type Run } from "./protocol.ts";
 import * as shaders from "./shaders.ts";
 
 const BYTES_PER_VERTEX = 8;
@@ -322,7 +322,7 @@ export class Renderer {
 
   #bodies(run: Run, camera: Camera, palette: Palette, movables: Float32Array): void {
     const px = 1 / camera.pxPerMm;
-    for (const spot of [...run.circles, ...this.#floors.flatMap((floor) => floor.circles)]) {
+    for (const spot of spotsOf(run, this.#floors)) {
       const rim = circle(spot.x, spot.y, spot.radius);
       for (let i = 0; i < rim.length; i += 2) this.#below.line(rim[i]!, rim[i + 1]!, 2 * px, palette.accent);
     }
