@@ -1,6 +1,6 @@
 #!/usr/bin/env node
 // What the web page of a run costs and does: frames per second, bytes per viewer, viewers beside a run, recordings.
-// Usage: bench/view.mjs [-w] [-n ROUNDS] [-k BUILD]     default: 3 rounds, build/release
+// Usage: bench/view.mjs [-w] [-n ROUNDS] [-k BUILD]     default: 5 rounds, build/release
 //   -w  write the tables to docs/results/view.md
 // Needs a build with tests, Chromium, and the npm packages of scripts/setup --develop. Rounds alternate between the conditions
 // that are compared; tables give medians.
@@ -15,7 +15,7 @@ import { Served, eventually, launchBrowser } from "../tests/clients/view/browser
 const root = path.resolve(path.dirname(fileURLToPath(import.meta.url)), "..");
 const words = process.argv.slice(2);
 const option = (name, otherwise) => (words.includes(name) ? words[words.indexOf(name) + 1] : otherwise);
-const rounds = Number(option("-n", "3"));
+const rounds = Number(option("-n", "5"));
 const build = path.resolve(root, option("-k", "build/release"));
 const [kilotwin, view, samples] = ["kilotwin", "kilotwin-view", "tests/clients/view/view_samples"].map((name) => path.join(build, name));
 const npm = path.join(root, "build/npm");
@@ -108,9 +108,10 @@ class Viewer {
 async function drawing() {
   say("\n## Frames per second of drawing\n");
   say("A recording with a state every 0.1 s plays at real time. Chromium without a window draws 1280 x 720 by software (SwiftShader).");
-  say("The browser asks for at most 60 frames per second. The CPU time is that of all its processes; it tells how many frames a machine");
-  say("draws that does nothing else.\n");
-  say("| robots | trails | messages in a picture | frames drawn per second | CPU time of a frame | bytes of a frame | bytes per second to the viewer | load |\n|---|---|---|---|---|---|---|---|");
+  say("No GPU was in the machine, so the rates are those of a software renderer. The browser asks for at most 60 frames per second. The");
+  say("CPU time is that of all its processes; it tells how many frames a machine draws that does nothing else. The script time is what the");
+  say("page's own program takes for a frame, without the renderer: a machine with a GPU needs that.\n");
+  say("| robots | trails | messages in a picture | frames drawn per second | CPU time of a frame | script time of a frame | bytes of a frame | bytes per second to the viewer | load |\n|---|---|---|---|---|---|---|---|---|");
   const { browser, reason } = await launchBrowser(npm);
   if (reason) throw new Error(reason);
   try {
@@ -131,13 +132,85 @@ async function drawing() {
       const passed = (after.now - before.now) / 1000;
       const frames = after.received - before.received;
       const perSecond = (name) => (after[name] - before[name]) / passed;
-      say(`| ${robots} | ${trails ? "yes" : "no"} | ${((after.flights - before.flights) / Math.max(1, after.drawn - before.drawn)).toFixed(0)} | ${perSecond("drawn").toFixed(1)} | ${(1000 * cpuOfFrame).toFixed(0)} ms | ${Math.round((after.bytes - before.bytes) / Math.max(1, frames))} | ${(perSecond("bytes") / 1000).toFixed(0)} kB/s | ${load()} |`);
+      say(`| ${robots} | ${trails ? "yes" : "no"} | ${((after.flights - before.flights) / Math.max(1, after.drawn - before.drawn)).toFixed(0)} | ${perSecond("drawn").toFixed(1)} | ${(1000 * cpuOfFrame).toFixed(0)} ms | ${((after.drawMs - before.drawMs) / Math.max(1, after.drawn - before.drawn)).toFixed(2)} ms | ${Math.round((after.bytes - before.bytes) / Math.max(1, frames))} | ${(perSecond("bytes") / 1000).toFixed(0)} kB/s | ${load()} |`);
       await page.close();
       await served.stop();
     }
   } finally {
     await browser.close();
   }
+}
+
+/** Moves the time line and waits until the page has drawn the state there. */
+async function scrubbing() {
+  const [robots, states, moves] = [100000, 60, 40];
+  say("\n## Scrubbing in the browser\n");
+  say(`A recording of ${robots} robots with a state per second. The time line is set to ${moves} times, one after the other; each is measured`);
+  say("from the input to the end of the page's drawing of the state there.\n");
+  say("| median | worst | load |\n|---|---|---|");
+  const { browser, reason } = await launchBrowser(npm);
+  if (reason) throw new Error(reason);
+  const served = await Served.start([view, "view", recordingOf(robots, states, 1)], scratch);
+  try {
+    const page = await browser.newPage({ viewport: { width: 1280, height: 720 } });
+    await page.goto(served.address);
+    await eventually("a picture", () => page.evaluate(() => window.kilotwin.drawn > 3));
+    await page.getByRole("button", { name: "Pause", exact: true }).click();
+    await pause(2);
+    const times = await page.evaluate(async (count) => {
+      const line = document.getElementById("line");
+      const nextFrame = () => new Promise(requestAnimationFrame);
+      const all = [];
+      for (let i = 0; i < count; ++i) {
+        const { received, drawn } = window.kilotwin;
+        const began = performance.now();
+        line.value = String((Number(line.max) * ((7 * i + 3) % count)) / count);
+        line.dispatchEvent(new Event("input"));
+        while (window.kilotwin.received === received) await new Promise((resolve) => setTimeout(resolve, 0));
+        const drawnThen = Math.max(drawn, window.kilotwin.drawn);
+        while (window.kilotwin.drawn === drawnThen) await nextFrame();
+        all.push(performance.now() - began);
+      }
+      return all;
+    }, moves);
+    say(`| ${median(times).toFixed(0)} ms | ${Math.max(...times).toFixed(0)} ms | ${load()} |`);
+    await page.close();
+  } finally {
+    await served.stop();
+    await browser.close();
+  }
+}
+
+/** From the command line to the first picture in which robots have moved. */
+async function startOfAWatchedRun() {
+  const experiment = path.join(root, "experiments/disperse.txtpb");
+  say("\n## From the command to the first movement\n");
+  say("`kilotwin run experiments/disperse.txtpb --pace 1 --view`, the address opened at once in a browser that runs already. Seconds from the");
+  say(`command, medians of ${rounds} rounds.\n`);
+  say("| address printed | first picture | first movement drawn | load |\n|---|---|---|---|");
+  const { browser, reason } = await launchBrowser(npm);
+  if (reason) throw new Error(reason);
+  const times = [];
+  try {
+    for (let round = 0; round < rounds; ++round) {
+      const began = performance.now();
+      const passed = () => (performance.now() - began) / 1000;
+      const served = await Served.start([kilotwin, "run", experiment, "--pace", "1", "--duration", "600", "--view", "--out", path.join(scratch, `watched-${round}`)], scratch);
+      const printed = passed();
+      const page = await browser.newPage({ viewport: { width: 1280, height: 720 } });
+      await page.goto(served.address);
+      await page.waitForFunction(() => window.kilotwin?.received > 0, undefined, { polling: "raf" });
+      const pictured = passed();
+      await page.waitForFunction(() => window.kilotwin.moved, undefined, { polling: "raf" });
+      times.push([printed, pictured, passed()]);
+      await page.close();
+      await served.stop();
+    }
+  } finally {
+    await browser.close();
+  }
+  const column = (i) => `${median(times.map((one) => one[i])).toFixed(2)} s`;
+  say(`| ${column(0)} | ${column(1)} | ${column(2)} | ${load()} |`);
 }
 
 async function recordings() {
@@ -176,8 +249,8 @@ async function recordings() {
   }
 }
 
-/** A federated run as fast as it goes, with viewers beside it. */
-async function watchedRun(name, viewers, stalled) {
+/** A federated run with viewers beside it, as fast as it goes or at a pace. */
+async function watchedRun(name, viewers, stalled, more) {
   const out = path.join(scratch, name);
   const domain = 150 + Math.floor(Math.random() * 60);
   let served;
@@ -186,7 +259,7 @@ async function watchedRun(name, viewers, stalled) {
     served = await Served.start([view, "view", "--domain", String(domain)], scratch);
     watching = Array.from({ length: viewers }, () => new Viewer(served.port));
   }
-  const run = spawn(kilotwin, ["run", path.join(root, "experiments/disperse.txtpb"), "--robots", "1000", "--duration", "30", "--partitions", "1x1", "--quiet", "--domain", String(domain), "--out", out], { stdio: ["ignore", "ignore", "inherit"] });
+  const run = spawn(kilotwin, ["run", path.join(root, "experiments/disperse.txtpb"), "--robots", "1000", "--partitions", "1x1", ...more, "--quiet", "--domain", String(domain), "--out", out], { stdio: ["ignore", "ignore", "inherit"] });
   const status = await new Promise((resolve) => {
     run.on("exit", resolve);
     if (stalled) Promise.all(watching.map((viewer) => viewer.ready)).then(() => watching.forEach((viewer) => viewer.stall()));
@@ -203,25 +276,25 @@ async function watchedRun(name, viewers, stalled) {
   const bytes = watching.reduce((sum, viewer) => sum + viewer.bytes, 0);
   watching.forEach((viewer) => viewer.close());
   fs.rmSync(out, { recursive: true });
-  return { hash: summary.state_hash, wall: summary.wall_s, cpu: summary.cpu_s, gatewayCpu, frames, bytes, recording: summary };
+  return { hash: summary.state_hash, wall: summary.wall_s, cpu: summary.cpu_s, gatewayCpu, frames, bytes, late: summary.late_ticks };
 }
 
-async function viewersBesideARun() {
+async function viewersBesideARun(title, more, how) {
   const conditions = [["none", 0, false], ["one", 1, false], ["20 that read", 20, false], ["20 that never read", 20, true]];
   const results = new Map(conditions.map(([name]) => [name, []]));
   for (let round = 0; round < rounds; ++round)
-    for (const [name, viewers, stalled] of conditions) results.get(name).push(await watchedRun(`run-${round}-${viewers}-${stalled}`, viewers, stalled));
-  say("\n## Viewers beside a run\n");
-  say(`\`experiments/disperse.txtpb\` with 1000 robots for 30 s, federated in one partition, as fast as it goes: ${rounds} rounds. Gateway and`);
+    for (const [name, viewers, stalled] of conditions) results.get(name).push(await watchedRun(`run-${round}-${viewers}-${stalled}`, viewers, stalled, more));
+  say(`\n## ${title}\n`);
+  say(`\`experiments/disperse.txtpb\` with 1000 robots, federated in one partition, ${how}: ${rounds} rounds. Gateway and`);
   say("viewers share the machine with the run. CPU time of the run counts the run's processes alone; ratios are to no viewer.\n");
-  say("| viewers | state hash | wall time of the run | ratio | CPU time of the run | ratio | CPU time of the gateway | frames per viewer | bytes per second and viewer |\n|---|---|---|---|---|---|---|---|---|");
+  say("| viewers | state hash | wall time of the run | ratio | CPU time of the run | ratio | CPU time of the gateway | frames per viewer | bytes per second and viewer | late ticks |\n|---|---|---|---|---|---|---|---|---|---|");
   const of = (name, field) => median(results.get(name).map((one) => one[field]));
   for (const [name, viewers] of conditions) {
     const hashes = [...new Set(results.get(name).map((one) => one.hash))].join(", ");
     const ratio = (field) => (of(name, field) / of("none", field)).toFixed(2);
     const each = (field, scale = 1) => (viewers === 0 ? "" : (of(name, field) / viewers / scale).toFixed(0));
     const rate = viewers === 0 ? "" : `${(of(name, "bytes") / viewers / of(name, "wall") / 1000).toFixed(0)} kB/s`;
-    say(`| ${name} | \`${hashes}\` | ${of(name, "wall").toFixed(2)} s | ${ratio("wall")} | ${of(name, "cpu").toFixed(2)} s | ${ratio("cpu")} | ${viewers === 0 ? "" : `${of(name, "gatewayCpu").toFixed(2)} s`} | ${each("frames")} | ${rate} |`);
+    say(`| ${name} | \`${hashes}\` | ${of(name, "wall").toFixed(2)} s | ${ratio("wall")} | ${of(name, "cpu").toFixed(2)} s | ${ratio("cpu")} | ${viewers === 0 ? "" : `${of(name, "gatewayCpu").toFixed(2)} s`} | ${each("frames")} | ${rate} | ${of(name, "late") ?? "no pace"} |`);
   }
   const spread = results.get("none").map((one) => one.wall);
   say(`\nWall times without a viewer lay between ${Math.min(...spread).toFixed(2)} s and ${Math.max(...spread).toFixed(2)} s; the load at the end was ${load()}.`);
@@ -244,9 +317,13 @@ function recordingCost() {
 
 try {
   await drawing();
+  await scrubbing();
+  await startOfAWatchedRun();
   await recordings();
   recordingCost();
-  await viewersBesideARun();
+  // 30 s of the robots take half a second of two cores, so 1500 s take more than 20 s.
+  await viewersBesideARun("Viewers beside a run without a pace", ["--duration", "1500"], "1500 s as fast as it goes");
+  await viewersBesideARun("Viewers beside a run at real time", ["--duration", "20", "--pace", "1"], "20 s at real time");
   if (words.includes("-w")) fs.writeFileSync(path.join(root, "docs/results/view.md"), `${header}${text.join("\n")}\n`);
 } finally {
   fs.rmSync(scratch, { recursive: true, force: true });

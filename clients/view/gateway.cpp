@@ -304,6 +304,7 @@ class Gateway::Service {
       case Request::Kind::kOutside:
       case Request::Kind::kFlights:
       case Request::Kind::kFloors:
+      case Request::Kind::kLight:
       case Request::Kind::kWork:
       case Request::Kind::kMarks: return viewer.ask(request);
       default: break;
@@ -407,6 +408,7 @@ class Gateway::Service {
       case Request::Kind::kProgram: return answers_->program(request.robot, request.tick);
       case Request::Kind::kOutside: return answers_->outside(request.tick);
       case Request::Kind::kFlights: return answers_->flights(request.from, request.tick);
+      case Request::Kind::kLight: return answers_->light(request.tick);
       case Request::Kind::kWork: return answers_->work();
       case Request::Kind::kMarks: return answers_->marks();
       case Request::Kind::kPlots: return answers_->plots();

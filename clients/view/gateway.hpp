@@ -36,6 +36,8 @@ class Answers {
   /// What lies on the floor at that tick: a number that changes with it, and a message of type "floors".
   [[nodiscard]] virtual std::uint64_t floors_version(std::int64_t tick) = 0;
   [[nodiscard]] virtual std::string floors_at(std::int64_t tick) = 0;
+  /// The light at that tick, a message of type "light". Empty: the run has none.
+  [[nodiscard]] virtual std::string light(std::int64_t tick) = 0;
   /// A text message, or empty: there is none.
   [[nodiscard]] virtual std::string trail(std::uint32_t robot, std::int64_t tick) = 0;
   [[nodiscard]] virtual std::string robot(std::uint32_t robot, std::int64_t tick) = 0;

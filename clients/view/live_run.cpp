@@ -14,6 +14,7 @@
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/federation/frame_check.hpp"
+#include "core/plan/senses_settings.hpp"
 #include "idl/experiment.pb.h"
 
 namespace kilotwin::view {
@@ -188,6 +189,8 @@ void LiveRun::begin(Gateway& gateway) {
       packets_.clear();
       live_work_.clear();
       live_flights_.clear();
+      x_mm_.clear();
+      y_mm_.clear();
     }
     gateway.show(*this, text);
     if (tells_) say(fmt::format("kilotwin: sees run {}, {} robots", one_line(facts.name, 128), facts.robots));
@@ -208,6 +211,13 @@ void LiveRun::post_state(Gateway& gateway) {
   unposted_ = false;
   if (run_ == 0) return;
   next_post_ = Clock::now() + kBetweenStatesOfAFastRun;
+  {
+    const std::lock_guard lock(mutex_);
+    if (plan_ && plan_->light_settings()) {
+      x_mm_ = swarm.x_mm;
+      y_mm_ = swarm.y_mm;
+    }
+  }
   FrameColumns columns;
   columns.x_mm = swarm.x_mm;
   columns.y_mm = swarm.y_mm;
@@ -241,6 +251,18 @@ std::uint64_t LiveRun::floors_version(std::int64_t tick) {
 std::string LiveRun::floors_at(std::int64_t tick) {
   const std::shared_ptr<RecordedRun> recorded = recording();
   return recorded ? recorded->floors_at(tick) : std::string();
+}
+
+std::string LiveRun::light(std::int64_t tick) {
+  std::vector<double> x_mm, y_mm;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!light_ || light_of_ != run_) light_.emplace(plan_);
+    light_of_ = run_;
+    x_mm = x_mm_;
+    y_mm = y_mm_;
+  }
+  return light_->text(tick, x_mm, y_mm);
 }
 
 std::string LiveRun::robot(std::uint32_t robot, std::int64_t tick) {

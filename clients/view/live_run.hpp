@@ -18,6 +18,7 @@
 #include "clients/view/flights.hpp"
 #include "clients/view/frame_code.hpp"
 #include "clients/view/gateway.hpp"
+#include "clients/view/light_picture.hpp"
 #include "clients/view/recorded_run.hpp"
 #include "clients/view/work.hpp"
 #include "core/federation/topics.hpp"
@@ -40,6 +41,7 @@ class LiveRun : public Answers {
   [[nodiscard]] std::string frame_at(std::int64_t, std::uint32_t) override { return {}; }
   [[nodiscard]] std::uint64_t floors_version(std::int64_t tick) override;
   [[nodiscard]] std::string floors_at(std::int64_t tick) override;
+  [[nodiscard]] std::string light(std::int64_t tick) override;
   [[nodiscard]] std::string trail(std::uint32_t, std::int64_t) override { return {}; }
   [[nodiscard]] std::string robot(std::uint32_t robot, std::int64_t tick) override;
   [[nodiscard]] std::string plots() override;
@@ -88,6 +90,7 @@ class LiveRun : public Answers {
   std::deque<ShownPacket> packets_;          // the newest
   LiveWork live_work_;
   LiveFlights live_flights_;
+  std::vector<double> x_mm_, y_mm_;    // of the newest state, where the run has light
   Clock::time_point flights_until_{};  // until then messages are wanted
   dds::Reader<PublicRunStatus> statuses_;
   dds::Reader<PublicTrackerFrame> tracker_frames_;
@@ -98,6 +101,8 @@ class LiveRun : public Answers {
   Clock::time_point next_post_{};  // of a state
   bool unposted_ = false;          // the newest state
   PositionGrid grid_;
+  std::optional<LightPicture> light_;  // of the gateway's thread, like what follows; of the run light_of_
+  std::uint64_t light_of_ = 0;
   const std::string client_;   // how requests are signed
   std::uint32_t request_ = 0;  // of the gateway's thread
 };

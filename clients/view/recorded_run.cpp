@@ -87,10 +87,11 @@ RecordedRun::RecordedRun(const fs::path& run) : reader_(recording_of(run)), inde
       firmware_ = firmware_of(resolved);
       federated_ = resolved.mode() == "federated";
       logs_of_ = directory.path();
+      plan_ = plan_of(*experiment, &resolved);
     }
   }
   grid_ = grid_of(*experiment);
-  plan_ = plan_of(*experiment);
+  if (!plan_) plan_ = plan_of(*experiment);
   experiment_ = std::move(experiment);
 }
 
@@ -180,6 +181,14 @@ std::string RecordedRun::floors_at(std::int64_t tick) {
   std::vector<proto::FloorRecord> list;
   for (auto& [environment, floor] : newest) list.push_back(std::move(floor));
   return floors_text(list);
+}
+
+std::string RecordedRun::light(std::int64_t tick) {
+  const std::lock_guard lock(mutex_);
+  if (!light_) light_.emplace(plan_);
+  const proto::StateRecord* const at = state(index_.at_or_before(tick));
+  return at == nullptr ? std::string()
+                       : light_->text(tick, recorder::values(at->x_mm()), recorder::values(at->y_mm()));
 }
 
 std::string RecordedRun::trail(std::uint32_t robot, std::int64_t tick) {

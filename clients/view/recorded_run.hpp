@@ -13,6 +13,7 @@
 #include "clients/recorder/state_index.hpp"
 #include "clients/view/frame_code.hpp"
 #include "clients/view/gateway.hpp"
+#include "clients/view/light_picture.hpp"
 #include "clients/view/outside.hpp"
 #include "clients/view/recorded_curves.hpp"
 #include "clients/view/robot_messages.hpp"
@@ -44,6 +45,7 @@ class RecordedRun : public Answers {
   [[nodiscard]] std::string frame_at(std::int64_t tick, std::uint32_t request) override;
   [[nodiscard]] std::uint64_t floors_version(std::int64_t tick) override;
   [[nodiscard]] std::string floors_at(std::int64_t tick) override;
+  [[nodiscard]] std::string light(std::int64_t tick) override;
   [[nodiscard]] std::string trail(std::uint32_t robot, std::int64_t tick) override;
   [[nodiscard]] std::string robot(std::uint32_t robot, std::int64_t tick) override;
   /// The same, where the caller knows whom it has heard lately.
@@ -80,6 +82,7 @@ class RecordedRun : public Answers {
   std::filesystem::path logs_of_;  // the run directory; empty: the recording stands alone
   std::unique_ptr<const proto::Experiment> experiment_;
   std::shared_ptr<const RunPlan> plan_;  // nullptr: the recording does not say enough
+  std::optional<LightPicture> light_;    // made when it is asked for
   std::vector<Mark> marks_;              // of the inputs that were read
   std::size_t inputs_read_ = 0;
   std::list<WholeRun> whole_runs_;  // the one that was used last is the first

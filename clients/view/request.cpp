@@ -15,25 +15,14 @@ namespace {
 using nlohmann::json;
 using Kind = Request::Kind;
 
-constexpr std::array<std::pair<std::string_view, Kind>, 19> kKinds{{{"hello", Kind::kHello},
-                                                                    {"next", Kind::kNext},
-                                                                    {"at", Kind::kAt},
-                                                                    {"trail", Kind::kTrail},
-                                                                    {"robot", Kind::kRobot},
-                                                                    {"plots", Kind::kPlots},
-                                                                    {"plot", Kind::kPlot},
-                                                                    {"program", Kind::kProgram},
-                                                                    {"outside", Kind::kOutside},
-                                                                    {"flights", Kind::kFlights},
-                                                                    {"floors", Kind::kFloors},
-                                                                    {"work", Kind::kWork},
-                                                                    {"marks", Kind::kMarks},
-                                                                    {"overhead", Kind::kOverhead},
-                                                                    {"pause", Kind::kPause},
-                                                                    {"continue", Kind::kContinue},
-                                                                    {"step", Kind::kStep},
-                                                                    {"stop", Kind::kStop},
-                                                                    {"place", Kind::kPlace}}};
+constexpr std::array<std::pair<std::string_view, Kind>, 20> kKinds{
+    {{"hello", Kind::kHello},     {"next", Kind::kNext},         {"at", Kind::kAt},
+     {"trail", Kind::kTrail},     {"robot", Kind::kRobot},       {"plots", Kind::kPlots},
+     {"plot", Kind::kPlot},       {"program", Kind::kProgram},   {"outside", Kind::kOutside},
+     {"flights", Kind::kFlights}, {"floors", Kind::kFloors},     {"light", Kind::kLight},
+     {"work", Kind::kWork},       {"marks", Kind::kMarks},       {"overhead", Kind::kOverhead},
+     {"pause", Kind::kPause},     {"continue", Kind::kContinue}, {"step", Kind::kStep},
+     {"stop", Kind::kStop},       {"place", Kind::kPlace}}};
 
 /// A whole number of the object, at least `lowest`; nothing where it is absent or another value.
 template <class Whole> std::optional<Whole> whole(const json& object, const char* key, std::int64_t lowest) {
@@ -98,6 +87,7 @@ bool take_fields(const json& object, Request& request) {
     case Kind::kRobot:
     case Kind::kProgram: return take(object, "tick", 0, request.tick) && take(object, "robot", 0, request.robot);
     case Kind::kFloors:
+    case Kind::kLight:
     case Kind::kOutside: return take(object, "tick", 0, request.tick);
     case Kind::kFlights: return take(object, "from", -1, request.from) && take(object, "tick", 0, request.tick);
     case Kind::kPlace: return take_place(object, request.place);

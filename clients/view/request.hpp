@@ -11,6 +11,7 @@
 ///   {"do": "outside", "tick": T}         what trackers saw, and packets for the overhead controller, up to tick T
 ///   {"do": "flights", "from": T, "tick": T}  messages that ended after the first tick, up to the second
 ///   {"do": "floors", "tick": T}          what lies on the floor of a live run, if it has changed
+///   {"do": "light", "tick": T}           light on the floor and lamps at tick T
 ///   {"do": "work"}                       where the time of the federates goes
 ///   {"do": "marks"}                      marks of the time line
 ///   {"do": "pause"} {"do": "continue"} {"do": "step", "steps": N} {"do": "stop"}
@@ -45,6 +46,7 @@ struct Request {
     kOutside,
     kFlights,
     kFloors,
+    kLight,
     kWork,
     kMarks,
     kPause,
@@ -56,7 +58,7 @@ struct Request {
   };
   Kind kind = Kind::kNext;
   std::string token;         ///< with kHello
-  std::int64_t tick = 0;     ///< with kAt, kTrail, kRobot, kProgram, kOutside, kFlights and kFloors
+  std::int64_t tick = 0;     ///< with kAt, kTrail, kRobot, kProgram, kOutside, kFlights, kFloors and kLight
   std::int64_t from = 0;     ///< with kFlights
   std::uint32_t number = 0;  ///< with kAt and kPlot
   std::uint32_t robot = 0;   ///< with kTrail, kRobot, kProgram, and kPlot if `of_robot`

@@ -87,16 +87,6 @@ bool records(const proto::Experiment& experiment, proto::RecordedEvent kind) {
   return std::find(kinds.begin(), kinds.end(), kind) != kinds.end();
 }
 
-/// Lamps that stand still.
-json lamps_of(const proto::Experiment& experiment) {
-  json list = json::array();
-  for (const proto::LightSource& source : experiment.light().source()) {
-    if (!source.has_circle() && source.waypoint_size() == 0)
-      list.push_back({{"x", source.x_mm()}, {"y", source.y_mm()}});
-  }
-  return list;
-}
-
 /// Circles of the environments that Kilotwin brings: food, home, a hub.
 json circles_of(const proto::Experiment& experiment) {
   json list = json::array();
@@ -152,7 +142,7 @@ std::string run_text(const RunOutline& outline, const proto::Experiment& experim
                   {"arena", arena_of(world.arena)},
                   {"obstacles", obstacles_of(world)},
                   {"movables", movables_of(world)},
-                  {"lamps", lamps_of(experiment)},
+                  {"light", experiment.has_light()},
                   {"circles", circles_of(experiment)},
                   {"partitions", partitions_of(outline, experiment)},
                   {"ghostMargin", outline.ghost_margin_mm},

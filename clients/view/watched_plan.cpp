@@ -6,12 +6,15 @@
 
 namespace kilotwin::view {
 
-std::shared_ptr<const RunPlan> plan_of(const proto::Experiment& experiment) {
+std::shared_ptr<const RunPlan> plan_of(const proto::Experiment& experiment, const proto::Manifest* of_run) {
   proto::Manifest manifest;
   manifest.set_run(1);
   proto::Experiment& known = *manifest.mutable_experiment();
   known = experiment;
-  known.mutable_light()->clear_image();
+  if (of_run != nullptr)
+    *manifest.mutable_light_raster() = of_run->light_raster();
+  else if (known.has_light())
+    known.mutable_light()->clear_image();
   known.clear_station();
   for (const proto::RobotGroup& group : experiment.robots()) {
     manifest.add_group_program(kNoProgram);

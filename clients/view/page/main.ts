@@ -24,6 +24,7 @@ const PROGRAM_EVERY_MS = 400;
 const COUNTS_EVERY_MS = 400;
 const OUTSIDE_EVERY_MS = 250;
 const FLOORS_EVERY_MS = 500;
+const LIGHT_EVERY_MS = 200;
 const WORK_EVERY_MS = 1000;
 /** Marks are asked for again while not all have come, and while the recording grows. */
 const MARKS_EVERY_MS = 1000;
@@ -70,6 +71,7 @@ class Page {
   #program: { tick: number; askedAt: number } | undefined; // what was asked for last
   #countsAsked: { tick: number; at: number } | undefined;
   #floorsAsked = -Infinity;
+  #lightAsked: { tick: number; at: number } | undefined;
   #outside: OutsideText | undefined;
   #ellipses: [number, number][][] = [];
   #outsideAsked: { tick: number; at: number } | undefined;
@@ -90,7 +92,8 @@ class Page {
   #bytes: { at: number; bytes: number }[] = [];
   #pace: { at: number; tick: number }[] = [];
   /** What tests measure. */
-  readonly counters = { drawn: 0, received: 0, bytes: 0, drawMs: 0, flights: 0, handOvers: 0, held: "" };
+  readonly counters = { drawn: 0, received: 0, bytes: 0, drawMs: 0, flights: 0, handOvers: 0, held: "", moved: false };
+  #firstDrawn: Frame | undefined;
 
   constructor() {
     this.#listen();
@@ -130,7 +133,7 @@ class Page {
     showConnection("lost");
     this.#playback.lost();
     this.#plots.lost();
-    this.#program = this.#outsideAsked = this.#countsAsked = undefined;
+    this.#program = this.#outsideAsked = this.#countsAsked = this.#lightAsked = undefined;
     this.#flights.forget();
     this.#mover.refused();
   }
@@ -173,6 +176,7 @@ class Page {
         this.#marksDue = true;
         this.#countsAsked = undefined;
         return;
+      case "light": return this.#renderer.setLight(message);
       case "floors": return this.#renderer.setFloors(message.floors);
       case "trail":
         if (message.robot === this.#selected) this.#takeTrail(message);
@@ -215,7 +219,7 @@ class Page {
     this.#line.max = String(run.lastTick);
     this.#playback.begin(run);
     this.#plots.begin(run);
-    this.#program = this.#outsideAsked = this.#outside = undefined;
+    this.#program = this.#outsideAsked = this.#outside = this.#lightAsked = undefined;
     this.#ellipses = [];
     showAlarms([]);
     this.#line.disabled = this.#playback.live;
@@ -241,10 +245,11 @@ class Page {
 
   /** Nothing that the graphics memory held is there any more, except trails all of it is made again. */
   #restorePicture(): void {
-    const { floors } = this.#renderer;
+    const { floors, light } = this.#renderer;
     this.#renderer = new Renderer(this.#picture);
     if (this.#run) this.#renderer.begin(this.#run, kindsOf(this.#run));
     this.#renderer.setFloors(floors);
+    this.#renderer.setLight(light);
     this.#shown = undefined;
     this.#stale = true;
   }
@@ -291,6 +296,9 @@ class Page {
     if (run && frame) this.#labels.draw(run, frame, this.#camera, this.#selected, (robot) => this.#placeOf(robot));
     this.counters.drawn += 1;
     this.counters.drawMs += performance.now() - began;
+    if (this.counters.moved || !frame) return;
+    const first = (this.#firstDrawn ??= frame);
+    this.counters.moved = first.robots === frame.robots && frame.x.some((x, robot) => x !== first.x[robot]);
   }
 
   #marks(selected: [number, number] | undefined): Marks {
@@ -395,6 +403,13 @@ class Page {
     this.#connection.send({ do: "floors", tick });
   }
 
+  #askLight(tick: number, now: number): void {
+    if (!this.#run?.light || this.#lightAsked?.tick === tick) return;
+    if (this.#lightAsked && now - this.#lightAsked.at < LIGHT_EVERY_MS) return;
+    this.#lightAsked = { tick, at: now };
+    this.#connection.send({ do: "light", tick });
+  }
+
   #askOutside(tick: number, now: number): void {
     const last = this.#outsideAsked;
     if (last && (last.tick === tick || now - last.at < OUTSIDE_EVERY_MS)) return;
@@ -440,6 +455,7 @@ class Page {
     }
     this.#askOutside(Math.floor(time), now);
     this.#askFloors(Math.floor(time), now);
+    this.#askLight(Math.floor(time), now);
     this.#askWork(now);
     this.#askMarks(now);
     this.#plots.update(now, time * run.tickSeconds);
@@ -626,7 +642,7 @@ class Page {
     if (!run || !frame) return;
     const selected = this.#selected === undefined ? undefined : this.#placeOf(this.#selected);
     const svg = svgOf(
-      { run, frame, kinds: kindsOf(run), floors: this.#renderer.floors, movables: frame.movables, marks: this.#marks(selected),
+      { run, frame, kinds: kindsOf(run), floors: this.#renderer.floors, light: this.#renderer.light, movables: frame.movables, marks: this.#marks(selected),
         selected: this.#selected, placeOf: (robot) => this.#placeOf(robot) },
       this.#camera, this.#theme.palette,
     );

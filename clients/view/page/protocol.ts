@@ -40,7 +40,8 @@ export interface Run {
   arena: { halfWidth: number; halfHeight: number; radius?: number; corners?: [number, number][] };
   obstacles: (Shape & { pose: [number, number, number] })[];
   movables: Shape[];
-  lamps: { x: number; y: number }[];
+  /** It has light, which is asked for by time. */
+  light: boolean;
   circles: Circle[];
   /** Columns and rows of the partitions over the rectangle around the arena. */
   partitions: [number, number];
@@ -71,6 +72,12 @@ export interface Floor {
   rows: number;
   rgba: string;
   circles: (Circle & { rgba: string })[];
+}
+
+/** Circles that are drawn: those on floors, and those of the experiment that no floor draws around the same centre. */
+export function spotsOf(run: Run, floors: Floor[]): Circle[] {
+  const painted = floors.flatMap((floor) => floor.circles);
+  return [...run.circles.filter((spot) => !painted.some(({ x, y }) => Math.hypot(x - spot.x, y - spot.y) < 1)), ...painted];
 }
 
 export interface RobotCounts {
@@ -181,6 +188,14 @@ export interface MarksText {
   marks: { tick: number; text: string }[];
 }
 
+/** Light on the floor at a tick, and the lamps: one that is off shines no light. */
+export interface LightText {
+  type: "light";
+  tick: number;
+  lamps: { x: number; y: number; on: boolean }[];
+  floor: Floor;
+}
+
 /** Where a robot was, oldest first, x and y in turn, mm; null: it was placed elsewhere in between. */
 export interface TrailText {
   type: "trail";
@@ -203,6 +218,7 @@ export type Message =
   | RobotCounts
   | { type: "extent"; lastTick: number; states: number }
   | { type: "floors"; floors: Floor[] }
+  | LightText
   | TrailText
   | { type: "grant"; steer: boolean }
   /** `refuses`: the request that the run refuses; empty: it refuses none. */

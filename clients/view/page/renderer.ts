@@ -3,7 +3,7 @@ import type { Camera } from "./camera.ts";
 import { GRID_PX, Triangles, circle, outline, roundStep, type Colour, type Point } from "./geometry.ts";
 import { FLOATS } from "./flights.ts";
 import { bordersOf } from "./partitions.ts";
-import type { Floor, Frame, Run } from "./protocol.ts";
+import { spotsOf, type Floor, type Frame, type LightText, type Run } from "./protocol.ts";
 import * as shaders from "./shaders.ts";
 
 const BYTES_PER_VERTEX = 8;
@@ -106,6 +106,7 @@ export class Renderer {
   #indexed = 0;
   #textures: WebGLTexture[] = [];
   #floors: Floor[] = [];
+  #light: LightText | undefined;
   /** Segments of the trails of all robots, oldest first: a buffer of two ends per robot each. */
   #segments: { buffer: WebGLBuffer; vertices: number }[] = [];
 
@@ -134,19 +135,36 @@ export class Renderer {
     this.#kinds = kinds;
     this.#robotCount = 0;
     this.forgetTrails();
+    this.#light = undefined;
     this.setFloors([]);
   }
 
   setFloors(floors: Floor[]): void {
+    this.#floors = floors;
+    this.#paintFloors();
+  }
+
+  setLight(light: LightText | undefined): void {
+    this.#light = light;
+    this.#paintFloors();
+  }
+
+  get light(): LightText | undefined {
+    return this.#light;
+  }
+
+  /** Light lies below what is painted. */
+  #paintFloors(): void {
     const gl = this.#gl;
     for (const texture of this.#textures) gl.deleteTexture(texture);
-    this.#floors = floors;
-    this.#textures = floors.map((floor) => {
+    const pictures = this.#light ? [this.#light.floor, ...this.#floors] : this.#floors;
+    this.#textures = pictures.map((floor) => {
       const texture = gl.createTexture();
       gl.bindTexture(gl.TEXTURE_2D, texture);
       gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, Math.max(1, floor.columns), Math.max(1, floor.rows), 0, gl.RGBA, gl.UNSIGNED_BYTE,
                     floor.columns * floor.rows > 0 ? bytesOf(floor.rgba) : new Uint8Array(4));
-      for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
+      const smooth = floor === this.#light?.floor ? gl.LINEAR : gl.NEAREST;
+      for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, smooth);
       for (const wrap of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, wrap, gl.CLAMP_TO_EDGE);
       return texture;
     });
@@ -304,11 +322,13 @@ export class Renderer {
 
   #bodies(run: Run, camera: Camera, palette: Palette, movables: Float32Array): void {
     const px = 1 / camera.pxPerMm;
-    for (const spot of [...run.circles, ...this.#floors.flatMap((floor) => floor.circles)]) {
+    for (const spot of spotsOf(run, this.#floors)) {
       const rim = circle(spot.x, spot.y, spot.radius);
       for (let i = 0; i < rim.length; i += 2) this.#below.line(rim[i]!, rim[i + 1]!, 2 * px, palette.accent);
     }
-    for (const lamp of run.lamps) {
+    for (const lamp of this.#light?.lamps ?? []) {
+      this.#below.path(circle(lamp.x, lamp.y, 9 * px, 24), 2 * px, palette.lamp, true);
+      if (!lamp.on) continue;
       this.#below.convex(circle(lamp.x, lamp.y, 9 * px, 24), palette.lamp);
       for (let i = 0; i < 8; ++i) {
         const [c, s] = [Math.cos((i * Math.PI) / 4), Math.sin((i * Math.PI) / 4)];

@@ -5,7 +5,7 @@ import { FLOATS } from "./flights.ts";
 import { circle, outline, type Colour, type Point } from "./geometry.ts";
 import { bordersOf, isGhost } from "./partitions.ts";
 import {
-  headingOf, KINDS, ledOf, LIFE_ABSENT, LIFE_FAILED, LIFE_FLAT, lifeOf, type Circle, type Floor, type Frame, type Run,
+  headingOf, KINDS, ledOf, LIFE_ABSENT, LIFE_FAILED, LIFE_FLAT, lifeOf, spotsOf, type Floor, type Frame, type LightText, type Run,
 } from "./protocol.ts";
 import type { Marks, Palette } from "./renderer.ts";
 
@@ -14,6 +14,7 @@ export interface Scene {
   frame: Frame;
   kinds: Uint8Array;
   floors: Floor[];
+  light: LightText | undefined;
   movables: Float32Array;
   marks: Marks;
   selected: number | undefined;
@@ -67,14 +68,14 @@ export function svgOf(scene: Scene, camera: Camera, palette: Palette): string {
   const line = (colour: Colour, width: number, more = ""): string => `fill="none" stroke="${css(colour)}" stroke-width="${width}"${more}`;
   const fill = (colour: Colour): string => `fill="${css(colour)}"`;
   const [left, top] = at([-w, h]);
-  const images = scene.floors.flatMap((floor) => {
+  const pictures = scene.light ? [scene.light.floor, ...scene.floors] : scene.floors;
+  const images = pictures.flatMap((floor) => {
     const data = raster(floor);
     return data ? [`<image x="${n(left)}" y="${n(top)}" width="${n(2 * w * scale)}" height="${n(2 * h * scale)}" preserveAspectRatio="none" image-rendering="pixelated" href="${data}"/>`] : [];
   });
   below.add(line(palette.wall, 3), path(edge.map(at), true));
-  const spots: Circle[] = [...run.circles, ...scene.floors.flatMap((floor) => floor.circles)];
-  for (const spot of spots) below.add(line(palette.accent, 2, ' stroke-dasharray="6 6"'), disc(at([spot.x, spot.y]), spot.radius * scale));
-  for (const lamp of run.lamps) below.add(fill(palette.lamp), disc(at([lamp.x, lamp.y]), 9));
+  for (const spot of spotsOf(run, scene.floors)) below.add(line(palette.accent, 2, ' stroke-dasharray="6 6"'), disc(at([spot.x, spot.y]), spot.radius * scale));
+  for (const lamp of scene.light?.lamps ?? []) below.add(lamp.on ? fill(palette.lamp) : line(palette.lamp, 2), disc(at([lamp.x, lamp.y]), 9));
   for (const body of run.obstacles) below.add(fill(palette.obstacle), path(outline(body, ...body.pose).map(at), true));
   const [columns, rows] = bordersOf(run);
   const borders: [Point, Point][] = [...columns.map((x): [Point, Point] => [[x, -h], [x, h]]), ...rows.map((y): [Point, Point] => [[-w, y], [w, y]])];

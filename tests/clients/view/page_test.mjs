@@ -6,7 +6,7 @@ import path from "node:path";
 import { eventually } from "./browser.mjs";
 import {
   clock, connected, counter, drawn, HALF_MM, kilotwin, newContext, onScreen, open, phase, picture, pictures, press, received, run, samples,
-  saved, scratch, serve, text, viewProgram,
+  saved, scratch, serve, sources, text, viewProgram,
 } from "./page_tools.mjs";
 
 /** Where robot `i` of the sample is: tests/clients/view/recordings.hpp. */
@@ -246,6 +246,36 @@ async function plotsAndPrograms() {
   assert.equal(await served.stop(), 0);
 }
 
+/** Lamps are drawn where they are at the time of the picture, over their light. */
+async function lightOnTheFloor() {
+  const lit = path.join(scratch, "lit");
+  execFileSync(kilotwin, ["run", path.join(sources, "experiments/phototaxis.txtpb"), "--robots", "5", "--duration", "90", "--mode", "local", "--quiet", "--out", lit]);
+  const served = await serve([viewProgram, "view", lit]);
+  const page = await open(served.address);
+  await eventually("a picture", async () => (await drawn(page)) > 1);
+  await press(page, "Pause");
+  /** Numbers of lamps on and off, and the picture of the light. */
+  const look = async () => {
+    const svg = (await saved(page, "Save the picture as SVG")).toString();
+    const lamps = { on: 0, off: 0, image: /<image [^>]*href="([^"]*)"/.exec(svg)?.[1] };
+    for (const [, attributes, data] of svg.matchAll(/<path ([^>]*) d="([^"]*a9 9 [^"]*)"/g))
+      lamps[attributes.includes('fill="none"') ? "off" : "on"] += data.split("M").length - 1;
+    return lamps;
+  };
+  await page.locator("#line").fill(String(Math.round(30 / 0.032768)));
+  let before;
+  await eventually("both lamps", async () => (before = await look()).on === 2 && before.off === 0 && before.image !== undefined);
+  await page.locator("#line").fill(String(Math.round(80 / 0.032768)));
+  await eventually("one lamp is off", async () => {
+    const now = await look();
+    return now.on === 1 && now.off === 1 && now.image !== before.image;
+  });
+  await picture(page, "light");
+  assert.deepEqual(page.faults, []);
+  await page.close();
+  assert.equal(await served.stop(), 0);
+}
+
 async function liveRun() {
   const served = await serve([kilotwin, "run", talkingExperiment(), "--pace", "1",
     "--partitions", "2x1", "--out", path.join(scratch, "run"), "--view"]);
@@ -331,4 +361,4 @@ async function liveRun() {
   assert.equal(await served.stop(), 0);
 }
 
-await run(recordedRun, plotsAndPrograms, liveRun);
+await run(recordedRun, plotsAndPrograms, lightOnTheFloor, liveRun);

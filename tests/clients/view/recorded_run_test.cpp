@@ -13,6 +13,7 @@
 
 #include "clients/recorder/observables.hpp"
 #include "clients/view/flights.hpp"
+#include "clients/view/light_picture.hpp"
 #include "clients/view/robot_log.hpp"
 #include "clients/view/watched_plan.hpp"
 #include "core/base/error.hpp"
@@ -375,6 +376,49 @@ TEST(RecordedRun, CountsMessagesUpToTheTick) {
       EXPECT_EQ(receiver["heard"][0]["count"], number);
     }
   }
+}
+
+/// How bright a cell of the picture is: its alpha, 0 to 190.
+int brightness(const json& light, std::uint32_t column, std::uint32_t row) {
+  const std::string text = light["floor"]["rgba"];
+  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  const std::size_t octet = 4 * (kLightCells * row + column) + 3, group = 4 * (octet / 3);
+  std::uint32_t bits = 0;
+  for (std::size_t k = 0; k < 4; ++k)
+    bits = bits << 6 | static_cast<std::uint32_t>(kDigits.find(text[group + k]) & 63);
+  return static_cast<int>(bits >> (16 - 8 * (octet % 3)) & 255);
+}
+
+TEST(LightPicture, HasLampsWhereTheyAreAndShadowsOfRobots) {
+  proto::Experiment experiment;
+  experiment.set_duration_s(100);
+  experiment.mutable_arena()->set_width_mm(640);
+  experiment.mutable_arena()->set_height_mm(640);
+  experiment.add_robots()->set_count(1);
+  EXPECT_EQ(LightPicture(plan_of(experiment)).text(0, {}, {}), "") << "no light";
+  proto::LightSource& lamp = *experiment.mutable_light()->add_source();
+  lamp.set_height_mm(30);
+  lamp.set_intensity(2);
+  experiment.mutable_light()->mutable_sensor()->set_cosine(false);  // the lamp shines along the floor
+  lamp.mutable_circle()->set_radius_mm(200);
+  lamp.mutable_circle()->set_period_s(40);
+  lamp.add_switch_s(30);
+  experiment.mutable_light()->set_shadows(true);
+  LightPicture picture(plan_of(experiment));
+  const auto at = [&picture](double time_s, double robot_y_mm) {
+    const std::array x{100.0}, y{robot_y_mm};
+    return json::parse(picture.text(TickLength{262144}.at_or_after(time_s).count(), x, y));
+  };
+  const json first = at(0, 300), shaded = at(0, 5), later = at(10, 300), off = at(31, 300);
+  EXPECT_NEAR(first["lamps"][0]["x"], 200, 1e-6);
+  EXPECT_NEAR(later["lamps"][0]["y"], 200, 1) << "it circles";
+  EXPECT_EQ(later["lamps"][0]["on"], true);
+  EXPECT_EQ(off["lamps"][0]["on"], false);
+  EXPECT_GT(brightness(first, 52, 31), 2 * brightness(first, 12, 31));
+  EXPECT_GT(brightness(later, 31, 12), 2 * brightness(later, 31, 52)) << "up is the first row";
+  EXPECT_GT(brightness(first, 36, 31), 0);
+  EXPECT_EQ(brightness(shaded, 36, 31), 0) << "behind the robot";
+  EXPECT_EQ(brightness(off, 52, 31), 0);
 }
 
 TEST(RecordedRun, ATrailIsCutWhereTheRobotWasPlacedElsewhere) {
