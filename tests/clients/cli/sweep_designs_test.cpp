@@ -47,7 +47,8 @@ TEST(SweepDesigns, WhereSmallIsGoodTheLargestValueIsTheWorst) {
 TEST(SweepDesigns, ADesignThatFailsWithAModelHasNoRank) {
   const std::vector<SweepPoint> points = with_models(sweep_points({"f=a,b"}), kModels);
   SweepDesigns designs(points, true);
-  for (const std::size_t point : std::vector<std::size_t>{0, 1, 3, 4, 5}) designs.add(point, 1, point == 0 ? 1000.0 : 1.0);
+  for (const std::size_t point : std::vector<std::size_t>{0, 1, 3, 4, 5})
+    designs.add(point, 1, point == 0 ? 1000.0 : 1.0);
   designs.add(2, 1, std::nan(""));
   const std::vector<Design> ranked = designs.ranked();
   EXPECT_EQ(ranked[0].fields, SweepPoint{"f=b"});
