@@ -9,10 +9,12 @@ namespace kilotwin::ohc {
 RunWatch::RunWatch(const dds::Participant& participant)
     : reader_(participant, topics::run_status(), [this](const PublicRunStatus& sample, dds::SampleState state) {
         const std::lock_guard lock(mutex_);
-        if (state.valid && state.alive)
+        if (state.valid && state.alive) {
           status_ = sample;
-        else if (status_ && status_->run == sample.run)
+          heard_ = Clock::now();
+        } else if (status_ && status_->run == sample.run) {
           status_.reset();
+        }
       }) {}
 
 std::optional<std::string> RunWatch::run() const {
@@ -20,6 +22,11 @@ std::optional<std::string> RunWatch::run() const {
   if (!status_ || status_->phase == kilotwin_open_ENDED || status_->phase == kilotwin_open_BROKEN)
     return std::nullopt;
   return status_->name;
+}
+
+bool RunWatch::is_silent() const {
+  const std::lock_guard lock(mutex_);
+  return status_ && Clock::now() - heard_ > kLongestSilence;
 }
 
 bool RunAnnouncer::look() {
