@@ -35,7 +35,7 @@ bool RunAnnouncer::look() {
   if (said_ && *said_ == name) return run.has_value();
   said_ = name;
   if (run) {
-    say(fmt::format("kilotwin: domain {}: run {}", domain_, name));
+    say(fmt::format("kilotwin: domain {}: run {}", domain_, one_line(name, 128)));
   } else {
     say(fmt::format(
         "kilotwin: domain {}: waiting for a run; start one with: kilotwin run EXPERIMENT --pace 1 --domain {}",
