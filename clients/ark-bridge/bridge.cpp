@@ -22,10 +22,20 @@ constexpr double kNoVelocity_px = 1;
 /// ARK sends 60 messages a second; what is older than a minute is of no use.
 constexpr std::size_t kMostOrders = 3600;
 
-bool moves(const ArkRobot& robot) {
-  const double speed = std::hypot(robot.vx_px, robot.vy_px);
+bool has_velocity(const ArkRobot& robot) {
   const bool initial = robot.vx_px == kNoVelocity_px && robot.vy_px == kNoVelocity_px;
-  return std::isfinite(speed) && speed >= kLeastSpeed_px && !initial;
+  return std::isfinite(robot.vx_px) && std::isfinite(robot.vy_px) && !initial;
+}
+
+bool tells_direction(const ArkRobot& robot) { return std::hypot(robot.vx_px, robot.vy_px) >= kLeastSpeed_px; }
+
+void place_motion(const ArkRobot& robot, const Door& door, TrackedRobot& out) {
+  if (!has_velocity(robot)) return;
+  if (tells_direction(robot))
+    door.placement.place_heading(door.placement.heading_of(robot.vx_px, robot.vy_px), out);
+  const proto::ArkDoor& ark = door.settings.ark();
+  if (!ark.has_frame_rate_hz()) return;
+  door.placement.place_velocity(robot.vx_px * ark.frame_rate_hz(), robot.vy_px * ark.frame_rate_hz(), out);
 }
 
 }  // namespace
@@ -74,7 +84,7 @@ std::vector<TrackedRobot> tracked_of(std::span<const ArkRobot> robots, const Doo
       tally.left_out("poses that are not finite", fmt::format("id {}", robot.id));
       continue;
     }
-    if (moves(robot)) door.placement.place_heading(door.placement.heading_of(robot.vx_px, robot.vy_px), out);
+    place_motion(robot, door, out);
     const auto colour = static_cast<std::size_t>(robot.colour);
     if (colour < kLed.size()) out.led = kLed[colour];
     all.push_back(out);

@@ -11,6 +11,7 @@
 #include "clients/cli/control_requests.hpp"
 #include "core/base/error.hpp"
 #include "core/base/pose.hpp"
+#include "core/base/say.hpp"
 #include "core/dds/dds.hpp"
 #include "core/os/interrupt.hpp"
 
@@ -31,12 +32,12 @@ using Status = RunControl::Status;
 
 std::string in_words(const Status& status) {
   std::string text =
-      fmt::format("{} is {} at tick {} of {}, {:.3f} s simulated, {:.1f} s of wall time\n", status.name,
+      fmt::format("{} is {} at tick {} of {}, {:.3f} s simulated, {:.1f} s of wall time\n", one_line(status.name),
                   name_of(status.phase), status.tick, status.last_tick, status.simulated_s, status.wall_s);
   text += fmt::format("robots    {}{}\nmessages  {} sent, {} received\n", status.robots,
                       status.robots_failed == 0 ? "" : fmt::format(", {} failed", status.robots_failed),
                       status.sent, status.received);
-  if (status.note[0] != '\0') text += fmt::format("note      {}\n", status.note);
+  if (status.note[0] != '\0') text += fmt::format("note      {}\n", one_line(status.note));
   return text;
 }
 

@@ -131,6 +131,12 @@ double Placement::heading_of(double vx, double vy) const {
   return std::atan2(up_ == proto::Placement::Z_UP ? vy : -vy, vx);
 }
 
+void Placement::place_velocity(double vx, double vy, TrackedRobot& robot) const {
+  const double floor_vy = up_ == proto::Placement::Z_UP ? vy : -vy;
+  robot.vx_mm_s = static_cast<float>(unit_mm_ * (cos_turn_ * vx - sin_turn_ * floor_vy));
+  robot.vy_mm_s = static_cast<float>(unit_mm_ * (sin_turn_ * vx + cos_turn_ * floor_vy));
+}
+
 SourcePose Placement::from_arena(double x_mm, double y_mm, double heading_rad) const {
   const double dx = (x_mm - x_mm_) / unit_mm_, dy = (y_mm - y_mm_) / unit_mm_;
   const Vector at = from_upright(up_, {cos_turn_ * dx + sin_turn_ * dy, -sin_turn_ * dx + cos_turn_ * dy, 0});

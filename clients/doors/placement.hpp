@@ -37,6 +37,8 @@ class Placement {
   void place_heading(double heading_rad, TrackedRobot& robot) const;
   /// The heading of a velocity in the other system's floor coordinates.
   [[nodiscard]] double heading_of(double vx, double vy) const;
+  /// Sets the velocity, from one in the other system's floor coordinates and unit per s.
+  void place_velocity(double vx, double vy, TrackedRobot& robot) const;
   /// A robot of the arena in the other system's coordinates.
   [[nodiscard]] SourcePose from_arena(double x_mm, double y_mm, double heading_rad) const;
 

@@ -40,6 +40,8 @@ void FrameWriter::write(const TrackedFrame& frame) {
   const auto yy = column(frame, &TrackedRobot::yy_mm2, sample.yy_mm2);
   const auto heading_variance = column(frame, &TrackedRobot::heading_variance_rad2, sample.heading_variance_rad2);
   const auto led = column(frame, &TrackedRobot::led, sample.led);
+  const auto vx = column(frame, &TrackedRobot::vx_mm_s, sample.vx_mm_s);
+  const auto vy = column(frame, &TrackedRobot::vy_mm_s, sample.vy_mm_s);
   writer_.write(sample);
 }
 

@@ -20,7 +20,8 @@ struct TrackedRobot {
   double heading_rad = 0;
   float xx_mm2 = 0, xy_mm2 = 0, yy_mm2 = 0;
   float heading_variance_rad2 = std::numeric_limits<float>::infinity();
-  std::uint8_t led = kLedUnknown;  ///< r | g << 2 | b << 4
+  std::uint8_t led = kLedUnknown;                                              ///< r | g << 2 | b << 4
+  float vx_mm_s = std::numeric_limits<float>::quiet_NaN(), vy_mm_s = vx_mm_s;  ///< NaN: not known
 };
 
 struct TrackedFrame {

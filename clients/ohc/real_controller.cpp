@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
-#include <deque>
 #include <mutex>
 #include <optional>
 
 #include "clients/ohc/guard.hpp"
 #include "clients/ohc/packet_log.hpp"
+#include "clients/ohc/packet_queue.hpp"
 #include "clients/ohc/run_watch.hpp"
 #include "clients/ohc/serial_port.hpp"
 #include "core/base/error.hpp"
@@ -35,19 +35,22 @@ class StationPackets {
   /// The next packet that is due. Waits for one until `until`.
   std::optional<OverheadPacket> take(Clock::time_point until) {
     std::unique_lock lock(mutex_);
-    while (queue_.empty() || queue_.front().due > Clock::now()) {
-      const Clock::time_point wake = queue_.empty() ? until : std::min(until, queue_.front().due);
-      arrived_.wait_until(lock, wake);
-      if (Clock::now() >= until && (queue_.empty() || queue_.front().due > until)) return std::nullopt;
+    for (;;) {
+      const Clock::time_point now = Clock::now();
+      if (auto packet = queue_.take(now)) return packet;
+      if (now >= until) return std::nullopt;
+      arrived_.wait_until(lock, std::min(until, queue_.next_due().value_or(until)));
     }
-    const OverheadPacket packet = queue_.front().packet;
-    queue_.pop_front();
-    return packet;
+  }
+  /// Drops all that waits.
+  void clear() {
+    const std::lock_guard lock(mutex_);
+    queue_.clear();
   }
   /// Packets that were dropped because the line is slower than the station.
   [[nodiscard]] std::uint64_t dropped() const {
     const std::lock_guard lock(mutex_);
-    return dropped_;
+    return queue_.dropped();
   }
   /// Packets that did not come: gaps in the station's count.
   [[nodiscard]] std::uint64_t lost() const {
@@ -56,37 +59,26 @@ class StationPackets {
   }
 
  private:
-  struct Due {
-    Clock::time_point due;
-    OverheadPacket packet;
-  };
-
   void receive(const PublicStationPacket& sample) {
-    constexpr std::size_t kMost = 16;
     constexpr double kLongestOffset_s = 1.0;
-    Due entry;
-    entry.packet.command = static_cast<OverheadCommand>(sample.command);
-    if (!is_known(entry.packet.command) || !(sample.offset_s >= 0 && sample.offset_s < kLongestOffset_s)) return;
-    std::copy_n(sample.message, entry.packet.message.size(), entry.packet.message.begin());
-    std::copy_n(sample.rest, entry.packet.rest.size(), entry.packet.rest.begin());
-    entry.due = Clock::now() + std::chrono::nanoseconds(static_cast<std::int64_t>(sample.offset_s * 1e9));
+    OverheadPacket packet;
+    packet.command = static_cast<OverheadCommand>(sample.command);
+    if (!is_known(packet.command) || !(sample.offset_s >= 0 && sample.offset_s < kLongestOffset_s)) return;
+    std::copy_n(sample.message, packet.message.size(), packet.message.begin());
+    std::copy_n(sample.rest, packet.rest.size(), packet.rest.begin());
+    const auto due = Clock::now() + std::chrono::nanoseconds(static_cast<std::int64_t>(sample.offset_s * 1e9));
     const std::lock_guard lock(mutex_);
     if (run_ == sample.run && sample.number > next_) lost_ += sample.number - next_;
     run_ = sample.run;
     next_ = sample.number + 1;
-    if (!queue_.empty()) entry.due = std::max(entry.due, queue_.back().due);
-    queue_.push_back(entry);
-    if (queue_.size() > kMost) {
-      queue_.pop_front();
-      ++dropped_;
-    }
+    queue_.put(packet, due);
     arrived_.notify_one();
   }
 
   mutable std::mutex mutex_;
   std::condition_variable arrived_;
-  std::deque<Due> queue_;
-  std::uint64_t run_ = 0, next_ = 0, dropped_ = 0, lost_ = 0;
+  PacketQueue queue_;
+  std::uint64_t run_ = 0, next_ = 0, lost_ = 0;
   dds::Reader<PublicStationPacket> reader_;
 };
 
@@ -102,14 +94,11 @@ class RealController {
 
   void work() {
     constexpr auto kLook = std::chrono::milliseconds(100);
-    const Clock::time_point begun = Clock::now();
-    bool had_run = false;
     while (interrupted() == 0) {
-      const bool has_run = announcer_.look();
-      if (had_run && !has_run) forward({}, begun);  // the run is over: nothing of it goes on
-      had_run = has_run;
-      const Clock::time_point until = Clock::now() + kLook;
-      while (const auto packet = station_.take(until)) forward(*packet, begun);
+      watch_run();
+      for (const auto until = Clock::now() + kLook; Clock::now() < until && interrupted() == 0;) {
+        if (const auto packet = station_.take(until)) forward(*packet);
+      }
       if (!guard_.runs()) take_over();
     }
   }
@@ -120,8 +109,27 @@ class RealController {
   }
 
  private:
-  void forward(const OverheadPacket& packet, Clock::time_point begun) {
-    log_.note(packet, std::chrono::duration<double>(Clock::now() - begun).count());
+  /// STOP where the run is over, or its station has fallen silent: nothing of it goes on.
+  void watch_run() {
+    const bool has_run = announcer_.look();
+    const bool is_silent = has_run && watch_.is_silent();
+    const bool lives = has_run && !is_silent;
+    if (lived_ && !lives) {
+      station_.clear();
+      forward({});
+    }
+    if (is_silent && !was_silent_) {
+      say(fmt::format("kilotwin: no status of the run for {} s: the robots get STOP until its station is back",
+                      RunWatch::kLongestSilence.count()));
+    }
+    if (was_silent_ && lives) say("kilotwin: the station is back");
+    lived_ = lives;
+    was_silent_ = is_silent;
+  }
+
+  /// Returns when the line is free for the next packet.
+  void forward(const OverheadPacket& packet) {
+    log_.note(packet, std::chrono::duration<double>(Clock::now() - begun_).count());
     if (!send_packet(guard_.socket(), packet) && !guard_.runs()) take_over();
   }
 
@@ -140,6 +148,8 @@ class RealController {
   RunAnnouncer announcer_;
   StationPackets station_;
   PacketLog log_;
+  const Clock::time_point begun_ = Clock::now();
+  bool lived_ = false, was_silent_ = false;
 };
 
 }  // namespace

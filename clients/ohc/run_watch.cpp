@@ -9,10 +9,12 @@ namespace kilotwin::ohc {
 RunWatch::RunWatch(const dds::Participant& participant)
     : reader_(participant, topics::run_status(), [this](const PublicRunStatus& sample, dds::SampleState state) {
         const std::lock_guard lock(mutex_);
-        if (state.valid && state.alive)
+        if (state.valid && state.alive) {
           status_ = sample;
-        else if (status_ && status_->run == sample.run)
+          heard_ = Clock::now();
+        } else if (status_ && status_->run == sample.run) {
           status_.reset();
+        }
       }) {}
 
 std::optional<std::string> RunWatch::run() const {
@@ -22,13 +24,18 @@ std::optional<std::string> RunWatch::run() const {
   return status_->name;
 }
 
+bool RunWatch::is_silent() const {
+  const std::lock_guard lock(mutex_);
+  return status_ && Clock::now() - heard_ > kLongestSilence;
+}
+
 bool RunAnnouncer::look() {
   const std::optional<std::string> run = watch_.run();
   const std::string name = run.value_or("");
   if (said_ && *said_ == name) return run.has_value();
   said_ = name;
   if (run) {
-    say(fmt::format("kilotwin: domain {}: run {}", domain_, name));
+    say(fmt::format("kilotwin: domain {}: run {}", domain_, one_line(name, 128)));
   } else {
     say(fmt::format(
         "kilotwin: domain {}: waiting for a run; start one with: kilotwin run EXPERIMENT --pace 1 --domain {}",

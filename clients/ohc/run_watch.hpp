@@ -1,6 +1,7 @@
 /// Whether a run is on the domain, and which.
 #pragma once
 
+#include <chrono>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -15,10 +16,16 @@ class RunWatch {
 
   /// Name of the run that has started and not ended; nothing where there is none.
   [[nodiscard]] std::optional<std::string> run() const;
+  /// Whether the station of that run has written no status for kLongestSilence. It promises some 5 a second.
+  [[nodiscard]] bool is_silent() const;
+  static constexpr std::chrono::seconds kLongestSilence{1};
 
  private:
+  using Clock = std::chrono::steady_clock;
+
   mutable std::mutex mutex_;
   std::optional<PublicRunStatus> status_;
+  Clock::time_point heard_{};  ///< when the last status came
   dds::Reader<PublicRunStatus> reader_;
 };
 

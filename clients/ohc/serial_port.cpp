@@ -20,7 +20,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-/// Longer than a controller that sends a page, with its interrupts off, loses octets.
+/// Surely longer than a page takes, for a port that buffers.
 constexpr milliseconds kPageTime{150};
 constexpr milliseconds kRetry{500};
 /// A controller that opening the port has reset listens after this.
@@ -47,15 +47,22 @@ class PortServer {
       const ssize_t count = recv(socket_, octets.data(), octets.size(), 0);
       if (count <= 0) return false;
       octets.resize(static_cast<std::size_t>(count));
-      if (const auto packet = packet_of(octets)) {
-        last_ = *packet;
-        if (port_.is_open() && !port_.send(*packet)) lose();
-      }
+      if (const auto packet = packet_of(octets)) forward(*packet);
+      const char done = 1;
+      static_cast<void>(::send(socket_, &done, sizeof done, MSG_NOSIGNAL));
     }
     if (port_.is_open() && port_.is_gone()) lose();
     if (!port_.is_open() && Clock::now() >= next_try_) regain();
     if (repeat_at_ && Clock::now() >= *repeat_at_) repeat();
     return true;
+  }
+
+  void forward(const OverheadPacket& packet) {
+    last_ = packet;
+    if (!port_.is_open()) return;
+    if (!port_.send(packet)) return lose();
+    if (packet.command == OverheadCommand::kBootPage)
+      std::this_thread::sleep_for(std::chrono::duration<double>(kPage_s));
   }
 
   void lose() {
@@ -144,7 +151,13 @@ void serve_port(SerialPort& port, int socket) { PortServer(port, socket).work();
 
 bool send_packet(int socket, const OverheadPacket& packet) {
   const std::string octets = octets_of(packet);
-  return send(socket, octets.data(), octets.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(octets.size());
+  if (send(socket, octets.data(), octets.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(octets.size())) return false;
+  char done = 0;
+  ssize_t count = 0;
+  do {
+    count = recv(socket, &done, sizeof done, 0);
+  } while (count < 0 && errno == EINTR);
+  return count > 0;
 }
 
 }  // namespace kilotwin::ohc

@@ -32,10 +32,11 @@ class SerialPort {
 };
 
 /// Sends packets that come by a socket that keeps messages apart, until that ends; then STOP. A port that is lost is opened
-/// again when it is back; the last packet is then repeated.
+/// again when it is back; the last packet is then repeated. Each packet is confirmed on the socket once the controller is ready
+/// for the next.
 void serve_port(SerialPort& port, int socket);
 
-/// A packet as it crosses that socket.
+/// Sends a packet by that socket, and waits until it is confirmed. False where the server has ended.
 [[nodiscard]] bool send_packet(int socket, const OverheadPacket& packet);
 
 }  // namespace kilotwin::ohc

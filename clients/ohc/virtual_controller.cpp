@@ -56,7 +56,7 @@ class VirtualController {
     const PacketDecoder::Counters& counters = decoder_.counters();
     say(fmt::format("kilotwin: {} octets, {}, {} wrong checksums, {} of an unknown type", counters.octets + deaf_,
                     log_.counts(), counters.bad_checksums, counters.unknown_types));
-    if (deaf_ > 0) say(fmt::format("kilotwin: {} octets came while the controller started", deaf_));
+    if (deaf_ > 0) say(fmt::format("kilotwin: {} octets came while the controller started or sent a page", deaf_));
     if (unheard_ > 0) say(fmt::format("kilotwin: {} packets came while there was no run", unheard_));
   }
 
@@ -73,13 +73,14 @@ class VirtualController {
   }
 
   void take(const LineClock::Octet& octet) {
-    if (octet.at_s < kStartUp_s) {
+    if (octet.at_s < deaf_until_s_) {
       ++deaf_;
       return;
     }
     const std::optional<OverheadPacket> packet = decoder_.take(octet.value);
     if (!packet) return;
     log_.note(*packet, octet.at_s);
+    if (packet->command == OverheadCommand::kBootPage) deaf_until_s_ = octet.at_s + kPage_s;
     if (packets_.readers() == 0) {
       ++unheard_;
       return;
@@ -105,6 +106,7 @@ class VirtualController {
   PacketDecoder decoder_;
   PacketLog log_;
   double next_look_s_ = 0;
+  double deaf_until_s_ = kStartUp_s;
   int baud_ = kBaud;
   std::uint64_t deaf_ = 0, unheard_ = 0;
 };

@@ -126,7 +126,8 @@ Json tracking_json(const TrackingTotals& t) {
              {"queueing_ms", Json{{"p50", tracker.way_p50_s * 1e3}, {"p99", tracker.way_p99_s * 1e3}}}});
   }
   const auto ms = [](double p50_s, double p99_s) { return Json{{"p50", p50_s * 1e3}, {"p99", p99_s * 1e3}}; };
-  return Json{{"arrival_to_effect_ms", ms(t.effect_p50_s, t.effect_p99_s)},
+  return Json{{"exposure_to_effect_ms", ms(t.exposed_p50_s, t.exposed_p99_s)},
+              {"arrival_to_effect_ms", ms(t.effect_p50_s, t.effect_p99_s)},
               {"arrival_to_publication_ms", ms(t.wait_p50_s, t.wait_p99_s)},
               {"publication_to_effect_ms", ms(t.step_p50_s, t.step_p99_s)},
               {"heard_messages", t.heard},

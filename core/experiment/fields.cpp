@@ -292,6 +292,7 @@ constexpr FieldRule kRules[] = {
     {"Ros2Door.gather_ms", 0, 1000, "ms"},
     {"Ros2Door.max_tilt_deg", 0, 180, "degrees"},
     {"ArkDoor.interval_ms", 10, 10000, "ms"},
+    {"ArkDoor.frame_rate_hz", 0, 1000, "Hz", Lower::kExcluded},
     {"ListenerDoor.robot", 0, kMostRobots - 1, ""},
     {"ListenerDoor.id_octet", 0, 8, ""},
     {"LogDoor.columns", 3, 6, ""},

@@ -107,6 +107,8 @@ struct TrackingTotals {
   std::vector<TrackerReport> trackers;
   /// From the arrival of a sample to the arrival of the poses on which it acted, s.
   double effect_p50_s = 0, effect_p99_s = 0;
+  /// The same from the middle of the sample's exposure, s.
+  double exposed_p50_s = 0, exposed_p99_s = 0;
   std::uint64_t joined = 0, left = 0, lost = 0;
   std::uint64_t jumps = 0;                 ///< samples contradicted an estimate, which began anew
   double wait_p50_s = 0, wait_p99_s = 0;   ///< arrival to the publication of the frame that it joins

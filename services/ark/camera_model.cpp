@@ -106,8 +106,9 @@ void CameraModel::step(const SwarmView& swarm, const MeasuredPoses* measured) {
 void CameraModel::expose(const SwarmView& swarm, const MeasuredPoses* measured) {
   for (std::uint32_t track = 0; track < tracks_.size(); ++track) {
     lose(track);
-    if (tracked_.seen[track] == 0) continue;
     const std::uint32_t robot = tracks_[track].follows;
+    if (is_absent(swarm, robot)) forget(track);
+    if (tracked_.seen[track] == 0) continue;
     const Place truth = measured != nullptr ? Place{measured->x_mm[robot], measured->y_mm[robot]}
                                             : Place{swarm.x_mm[robot], swarm.y_mm[robot]};
     see(track, truth, swarm.led[robot]);
@@ -122,11 +123,17 @@ void CameraModel::lose(std::uint32_t track) {
       random_.uniform(Stream::kStationCamera, track, Tick{frame_}, kLoss) < per_frame) {
     const double u = random_.uniform(Stream::kStationCamera, track, Tick{frame_}, kLossLength);
     it.lost_until = frame_ + 1 + static_cast<std::int64_t>(-kt_log(u) * setting_.lost_s * setting_.frame_rate_hz);
-    it.positions.clear();
-    it.motions.clear();
-    it.colours.clear();
+    forget(track);
   }
   tracked_.seen[track] = it.lost_until <= frame_ ? 1 : 0;
+}
+
+/// The track is lost in this frame, and its buffers begin anew.
+void CameraModel::forget(std::uint32_t track) {
+  tracks_[track].positions.clear();
+  tracks_[track].motions.clear();
+  tracks_[track].colours.clear();
+  tracked_.seen[track] = 0;
 }
 
 void CameraModel::see(std::uint32_t track, Place truth, std::uint8_t led) {

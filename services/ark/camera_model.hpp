@@ -9,6 +9,7 @@
 /// - its heading is the direction of that velocity, and stays where there is none;
 /// - its LED's class may be mistaken for another; the most frequent class of five frames is shown, of several the lowest;
 /// - the tracker may lose it for a while: nothing of it changes then, and its buffers begin anew;
+/// - a tracked robot that is absent is as good as lost;
 /// - two robots that are seen close to each other may change identities.
 #pragma once
 
@@ -60,6 +61,7 @@ class CameraModel {
   void expose(const SwarmView&, const MeasuredPoses*);
   void see(std::uint32_t track, Place truth, std::uint8_t led);
   void lose(std::uint32_t track);
+  void forget(std::uint32_t track);
   void exchange_identities();
   [[nodiscard]] Tick exposed_at(std::int64_t frame) const;
   [[nodiscard]] Tick shown_at(std::int64_t frame) const;

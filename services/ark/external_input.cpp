@@ -10,6 +10,15 @@
 #include "core/federation/frame_check.hpp"
 
 namespace kilotwin::ark {
+namespace {
+
+/// Far more than people and programs send between two ticks. What floods beyond it is ignored.
+constexpr std::size_t kMostWaiting = 1000;
+/// Of all topics. The requests of each are remembered for the whole run.
+constexpr std::size_t kMostClients = 1000;
+constexpr std::size_t kLongestName = 64;
+
+}  // namespace
 
 ExternalInput::ExternalInput(const RunPlan& plan, const dds::Participant& participant)
     : plan_(plan),
@@ -38,49 +47,77 @@ bool ExternalInput::is_new(const std::string& client, std::uint32_t request) {
   return true;
 }
 
-void ExternalInput::on_run_control(const PublicRunControl& sample) {
-  const std::lock_guard lock(mutex_);
-  if (!ours(sample.run) || !is_new(std::string("control ") + sample.client, sample.request)) return;
-  Directive directive;
-  switch (sample.command) {
-    case kilotwin_open_PAUSE_RUN: directive.kind = DirectiveKind::kPause; break;
-    case kilotwin_open_CONTINUE_RUN: directive.kind = DirectiveKind::kContinue; break;
-    case kilotwin_open_STEP_RUN:
-      directive.kind = DirectiveKind::kStep;
-      directive.steps = sample.steps;
-      break;
-    case kilotwin_open_STOP_RUN: directive.kind = DirectiveKind::kStop; break;
-    case kilotwin_open_CHECKPOINT_RUN: directive.kind = DirectiveKind::kCheckpoint; break;
-    default: return;
+template <class Sample, class Make>
+void ExternalInput::receive(const std::string& topic, const Sample& sample, Make make) {
+  std::string refusal;
+  std::optional<std::uint64_t> withheld;
+  {
+    const std::lock_guard lock(mutex_);
+    const std::string client = topic + ' ' + sample.client;
+    if (!ours(sample.run)) return;
+    if (last_request_.size() == kMostClients && last_request_.count(client) == 0) {
+      refusal = fmt::format("more than {} clients send requests", kMostClients);
+    } else if (!is_new(client, sample.request)) {
+      return;
+    } else if (waiting_.size() == kMostWaiting) {
+      refusal = fmt::format("{} requests wait already", kMostWaiting);
+    } else if (const std::optional<Directive> directive = make(refusal)) {
+      waiting_.push_back(*directive);
+    }
+    if (!refusal.empty()) withheld = limit_.pass(LineLimit::Clock::now());
   }
-  waiting_.push_back(directive);
+  if (!withheld) return;
+  say(fmt::format("a request of {} on the topic {} is ignored: {}{}", one_line(sample.client, kLongestName), topic,
+                  refusal, *withheld == 0 ? "" : fmt::format("; before it {} more were ignored", *withheld)));
+}
+
+void ExternalInput::on_run_control(const PublicRunControl& sample) {
+  receive("run_control", sample, [&](std::string& refusal) -> std::optional<Directive> {
+    Directive directive;
+    switch (sample.command) {
+      case kilotwin_open_PAUSE_RUN: directive.kind = DirectiveKind::kPause; break;
+      case kilotwin_open_CONTINUE_RUN: directive.kind = DirectiveKind::kContinue; break;
+      case kilotwin_open_STEP_RUN:
+        directive.kind = DirectiveKind::kStep;
+        directive.steps = sample.steps;
+        break;
+      case kilotwin_open_STOP_RUN: directive.kind = DirectiveKind::kStop; break;
+      case kilotwin_open_CHECKPOINT_RUN: directive.kind = DirectiveKind::kCheckpoint; break;
+      default:
+        refusal = fmt::format("there is no command {}", static_cast<int>(sample.command));
+        return std::nullopt;
+    }
+    return directive;
+  });
 }
 
 void ExternalInput::on_overhead_packet(const PublicOverheadPacket& sample) {
-  const std::lock_guard lock(mutex_);
-  if (!ours(sample.run) || !is_new(std::string("overhead ") + sample.client, sample.request)) return;
-  Directive directive;
-  directive.kind = DirectiveKind::kOverheadInput;
-  directive.packet.command = static_cast<OverheadCommand>(sample.command);
-  if (!is_known(directive.packet.command)) return;
-  std::copy_n(sample.message, directive.packet.message.size(), directive.packet.message.begin());
-  std::copy_n(sample.rest, directive.packet.rest.size(), directive.packet.rest.begin());
-  waiting_.push_back(directive);
+  receive("overhead_packets", sample, [&](std::string& refusal) -> std::optional<Directive> {
+    Directive directive;
+    directive.kind = DirectiveKind::kOverheadInput;
+    directive.packet.command = static_cast<OverheadCommand>(sample.command);
+    if (!is_known(directive.packet.command)) {
+      refusal = fmt::format("there is no packet of type {}", sample.command);
+      return std::nullopt;
+    }
+    std::copy_n(sample.message, directive.packet.message.size(), directive.packet.message.begin());
+    std::copy_n(sample.rest, directive.packet.rest.size(), directive.packet.rest.begin());
+    return directive;
+  });
 }
 
 void ExternalInput::on_relocation(const PublicRelocation& sample) {
-  const std::lock_guard lock(mutex_);
-  if (!ours(sample.run) || !is_new(std::string("relocation ") + sample.client, sample.request)) return;
-  Directive directive;
-  directive.kind = DirectiveKind::kRelocation;
-  const double heading = wrapped(std::remainder(sample.heading_rad, 2 * kPi));
-  directive.relocation = {sample.movable, sample.body, {sample.x_mm, sample.y_mm, heading}};
-  if (const char* const why = defect(directive.relocation, plan_)) {
-    say(fmt::format("the request of {} to place {} {} elsewhere is ignored: {}", sample.client,
-                    sample.movable ? "movable body" : "robot", sample.body, why));
-    return;
-  }
-  waiting_.push_back(directive);
+  receive("relocations", sample, [&](std::string& refusal) -> std::optional<Directive> {
+    Directive directive;
+    directive.kind = DirectiveKind::kRelocation;
+    const double heading = wrapped(std::remainder(sample.heading_rad, 2 * kPi));
+    directive.relocation = {sample.movable, sample.body, {sample.x_mm, sample.y_mm, heading}};
+    if (const char* const why = defect(directive.relocation, plan_)) {
+      refusal = fmt::format("{} {}: {}", sample.movable ? "movable body" : "robot", sample.body, why);
+      return std::nullopt;
+    }
+    return directive;
+  });
 }
 
 }  // namespace kilotwin::ark

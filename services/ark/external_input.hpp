@@ -1,11 +1,14 @@
-/// External input, from the public topics: collected on receive threads, handed over on the station's own.
+/// External input, from the public topics: collected on receive threads, handed over on the station's own. What clients can
+/// make it keep or write is bounded.
 #pragma once
 
+#include <chrono>
 #include <map>
 #include <mutex>
 #include <string>
 #include <vector>
 
+#include "core/base/line_limit.hpp"
 #include "core/federation/schedule.hpp"
 #include "core/federation/topics.hpp"
 #include "core/plan/plan.hpp"
@@ -20,6 +23,8 @@ class ExternalInput {
   std::vector<Directive> take();
 
  private:
+  /// Queues what `make(refusal)` makes of a sample that is new and for this run. A refusal is said, at a bounded rate.
+  template <class Sample, class Make> void receive(const std::string& topic, const Sample& sample, Make make);
   void on_run_control(const PublicRunControl&);
   void on_overhead_packet(const PublicOverheadPacket&);
   void on_relocation(const PublicRelocation&);
@@ -31,6 +36,7 @@ class ExternalInput {
   std::mutex mutex_;
   std::vector<Directive> waiting_;
   std::map<std::string, std::uint32_t> last_request_;  // per topic and client
+  LineLimit limit_{std::chrono::seconds(1)};
   dds::Reader<PublicRunControl> run_control_;
   dds::Reader<PublicOverheadPacket> overhead_packets_;
   dds::Reader<PublicRelocation> relocations_;

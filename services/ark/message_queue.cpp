@@ -64,9 +64,12 @@ std::optional<MessageQueue::Cycles> MessageQueue::ready(std::uint32_t robot) con
   return first;
 }
 
-ArkMessage MessageQueue::serve(std::uint32_t robot, Cycles now) {
-  const auto delay = static_cast<std::size_t>((now - ready(robot).value_or(now)) / kDelayBin);
+void MessageQueue::count_delay(Cycles asked, Cycles now) {
+  const auto delay = static_cast<std::size_t>((now - asked) / kDelayBin);
   ++counts_.delays[std::min(delay, kDelayBins - 1)];
+}
+
+ArkMessage MessageQueue::serve(std::uint32_t robot, Cycles now) {
   ++counts_.robot_messages;
   served_[robot] = now;
   std::uint32_t word = 0;
@@ -74,13 +77,18 @@ ArkMessage MessageQueue::serve(std::uint32_t robot, Cycles now) {
     std::uint32_t& environment = next_environment_[robot];
     while (asked_[slot(robot, environment)] == kNever) environment = (environment + 1) % environments_;
     word = word_[slot(robot, environment)];
+    count_delay(asked_[slot(robot, environment)], now);
     asked_[slot(robot, environment)] = kNever;
     environment = (environment + 1) % environments_;
   } else {
+    Cycles first = now;
     for (std::uint32_t e = 0; e < environments_; ++e) {
+      Cycles& asked = asked_[slot(robot, e)];
       word |= std::uint32_t{word_[slot(robot, e)]} << fields_[e].first;
-      asked_[slot(robot, e)] = kNever;
+      if (asked != kNever) first = std::min(first, asked);
+      asked = kNever;
     }
+    count_delay(first, now);
   }
   return {static_cast<std::uint16_t>(robot), static_cast<std::uint8_t>(word >> kDataBits),
           static_cast<std::uint16_t>(word & kDataMask)};

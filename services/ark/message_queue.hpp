@@ -28,8 +28,8 @@ struct QueueCounts {
   std::uint64_t broadcasts = 0;
   std::uint64_t replaced = 0;  ///< messages that a newer one replaced while they waited
   std::uint64_t too_wide = 0;  ///< messages dropped, as they did not fit in their environment's bits
-  /// Entry d: messages that waited between d and d + 1 times kDelayBin_s beyond their robot's least interval; the last
-  /// entry: so long or longer.
+  /// Entry d: messages that left between d and d + 1 times kDelayBin_s after the request, or after the first of those
+  /// that replaced each other; the last entry: so long or longer.
   std::vector<std::uint64_t> delays;
 };
 
@@ -63,6 +63,7 @@ class MessageQueue {
   /// The first instant at which the robot could be served; nothing where no message waits for it.
   [[nodiscard]] std::optional<Cycles> ready(std::uint32_t robot) const;
   [[nodiscard]] ArkMessage serve(std::uint32_t robot, Cycles now);
+  void count_delay(Cycles asked, Cycles now);
   [[nodiscard]] std::size_t slot(std::uint32_t robot, std::uint32_t environment) const {
     return std::size_t{robot} * environments_ + environment;
   }

@@ -31,7 +31,7 @@ class BuiltIn final : public PluginHost {
 }  // namespace
 
 std::unique_ptr<PluginHost> make_plugin_host(const EnvironmentSettings& setting, const std::string& host_sha256,
-                                             const std::filesystem::path& run_directory) {
+                                             const std::filesystem::path& run_directory, PluginPatience patience) {
   using Create = station::KilobotExperiment* (*)();
   constexpr std::array<std::pair<const char*, Create>, 5> kBuiltIn{{{"assign_ids", kilotwin_plugin_assign_ids},
                                                                     {"calibrate", kilotwin_plugin_calibrate},
@@ -52,7 +52,7 @@ std::unique_ptr<PluginHost> make_plugin_host(const EnvironmentSettings& setting,
     if (!std::filesystem::is_regular_file(file, ignored))
       throw UserError(file.string() + ": cannot be read; the run directory must hold the plugins of its manifest");
   }
-  return start_plugin_process(program, object);
+  return start_plugin_process(program, object, patience);
 }
 
 }  // namespace kilotwin::ark

@@ -21,12 +21,14 @@ class PluginHost {
 /// The time that a call of a plugin may take: processor time of its process, and wall time for one that waits for ever.
 struct PluginPatience {
   double cpu_s = 2, wall_s = 60;
+  static constexpr double kPacedWall_s = 2;  ///< of a run at a pace
 };
 
 /// Throws UserError where the run directory lacks the plugin's object, or there is no built-in plugin of the name.
 [[nodiscard]] std::unique_ptr<PluginHost> make_plugin_host(const EnvironmentSettings&,
                                                            const std::string& host_sha256,
-                                                           const std::filesystem::path& run_directory);
+                                                           const std::filesystem::path& run_directory,
+                                                           PluginPatience = {});
 /// `program`: the host's executable; `object`: the plugin's shared object. Throws RunError where it cannot be started.
 [[nodiscard]] std::unique_ptr<PluginHost> start_plugin_process(const std::filesystem::path& program,
                                                                const std::filesystem::path& object,

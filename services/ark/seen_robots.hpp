@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/frames/swarm_view.hpp"
+
 namespace kilotwin::ark {
 
 /// Classes of LEDs that ARK tells apart, with its numbers.
@@ -12,6 +14,11 @@ enum class LedClass : std::uint8_t { kOff = 0, kRed = 1, kGreen = 2, kBlue = 3 }
 /// Of a LED of r | g << 2 | b << 4, levels 0..3, by the scores of ARK's tracker: r - (.65 b + .75 g), g - (.65 b + .6 r),
 /// b - (.6 r + .56 g). The largest score above 0 wins; mixtures without one count as off.
 [[nodiscard]] LedClass led_class(std::uint8_t led);
+
+/// Whether a tracked robot is not there: it is lost, has left, or has not been seen yet. Its pose is then an old one.
+[[nodiscard]] inline bool is_absent(const SwarmView& swarm, std::uint32_t robot) {
+  return LifeCycle{swarm.life_cycle[robot]} == LifeCycle::kAbsent;
+}
 
 /// By the robot's number as the station knows it. Lengths mm, times s, angles rad.
 struct SeenRobots {

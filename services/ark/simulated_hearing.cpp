@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <optional>
 
-#include "core/base/ids.hpp"
 #include "core/base/pose.hpp"
 #include "core/math/elementary.h"
+#include "services/ark/seen_robots.hpp"
 
 namespace kilotwin::ark {
 namespace {
@@ -29,7 +29,7 @@ SimulatedHearing::SimulatedHearing(const RunPlan& plan) : plan_(plan) {
 std::vector<ArkMessage> SimulatedHearing::heard(const SwarmView& swarm) const {
   std::vector<ArkMessage> messages;
   for (const Listener& listener : listeners_) {
-    if (swarm.life_cycle[listener.robot] == static_cast<std::uint8_t>(LifeCycle::kAbsent)) continue;
+    if (is_absent(swarm, listener.robot)) continue;
     const double range_mm = listener.settings.range_mm;
     double nearest_mm2 = range_mm * range_mm;
     std::optional<std::size_t> chosen;

@@ -22,6 +22,7 @@ void StationEngine::save(proto::StationState& state) const {
   for (std::size_t robot = 0; !camera_ && robot < plan_.robots(); ++robot) {
     state.add_seen_mm(seen_.x_mm[robot]);
     state.add_seen_mm(seen_.y_mm[robot]);
+    state.mutable_seen()->push_back(static_cast<char>(seen_.seen[robot]));
   }
   for (const Plugin& plugin : plugins_) {
     proto::EnvironmentState& environment = *state.add_environment();
@@ -65,11 +66,13 @@ void StationEngine::load(Tick tick, std::span<const proto::StationState* const> 
   outputs_of_set_up_.clear();
   if (camera_) camera_->load(state.camera());
   if (!camera_) {
-    if (static_cast<std::size_t>(state.seen_mm_size()) != 2 * std::size_t{plan_.robots()})
+    if (static_cast<std::size_t>(state.seen_mm_size()) != 2 * std::size_t{plan_.robots()} ||
+        state.seen().size() != plan_.robots())
       throw RunError("the checkpoint holds no station's state of this experiment");
     for (std::uint32_t robot = 0; robot < plan_.robots(); ++robot) {
       seen_.x_mm[robot] = state.seen_mm(static_cast<int>(2 * robot));
       seen_.y_mm[robot] = state.seen_mm(static_cast<int>(2 * robot + 1));
+      seen_.seen[robot] = state.seen()[robot] != 0 ? 1 : 0;
     }
   }
   for (std::uint32_t i = 0; i < plugins_.size(); ++i) {

@@ -7,6 +7,7 @@
 #include "core/base/state_hash.hpp"
 #include "core/math/elementary.h"
 #include "core/plan/station_settings.hpp"
+#include "core/plan/tracking_settings.hpp"
 #include "idl/checkpoint.pb.h"
 
 namespace kilotwin::ark {
@@ -53,6 +54,13 @@ std::int64_t cycles_of(double seconds) {
   return whole + static_cast<std::int64_t>(static_cast<double>(whole) < cycles);
 }
 
+/// A paced run cannot stand still for a plugin: real robots drive on.
+PluginPatience patience_of(const RunPlan& plan) {
+  PluginPatience patience;
+  if (plan.pace > 0) patience.wall_s = PluginPatience::kPacedWall_s;
+  return patience;
+}
+
 /// Whether a multiple of `every_s` lies in (before, now].
 bool is_due(double before_s, double now_s, double every_s) {
   return every_s > 0 && (before_s < 0 || kt_floor(now_s / every_s) > kt_floor(before_s / every_s));
@@ -90,6 +98,8 @@ void StationEngine::see_initial_poses() {
     start.x_mm[robot] = pose.x_mm;
     start.y_mm[robot] = pose.y_mm;
     start.heading_rad[robot] = pose.heading_rad;
+    if (plan_.tracked(robot) && !plan_.tracking_settings().present_at_start)
+      start.life_cycle[robot] = static_cast<std::uint8_t>(LifeCycle::kAbsent);
   }
   seen_.x_mm = start.x_mm;
   seen_.y_mm = start.y_mm;
@@ -103,8 +113,11 @@ void StationEngine::see(const SwarmView& swarm) {
   const auto& y_mm = measurement_.any() ? measured_.y_mm : swarm.y_mm;
   const auto& heading_rad = measurement_.any() ? measured_.heading_rad : swarm.heading_rad;
   for (std::uint32_t robot = 0; robot < plan_.robots(); ++robot) {
+    const bool was_seen = seen_.seen[robot] != 0;
+    seen_.seen[robot] = is_absent(swarm, robot) ? 0 : 1;
+    if (seen_.seen[robot] == 0) continue;
     const double dx_mm = x_mm[robot] - seen_.x_mm[robot], dy_mm = y_mm[robot] - seen_.y_mm[robot];
-    const double moved_mm = __builtin_sqrt(dx_mm * dx_mm + dy_mm * dy_mm);
+    const double moved_mm = was_seen ? __builtin_sqrt(dx_mm * dx_mm + dy_mm * dy_mm) : 0;
     const double speed_mm = std::max(kLeastSpeed_mm, moved_mm / plan_.tick_length.seconds());
     seen_.x_mm[robot] = x_mm[robot];
     seen_.y_mm[robot] = y_mm[robot];
@@ -142,7 +155,7 @@ void StationEngine::set_up(std::uint32_t environment, bool resumed) {
   const EnvironmentSettings& setting = setting_.environments[environment];
   Plugin& plugin = plugins_[environment];
   plugin = {};
-  plugin.host = make_plugin_host(setting, setting_.host_sha256, run_directory_);
+  plugin.host = make_plugin_host(setting, setting_.host_sha256, run_directory_, patience_of(plan_));
   station::Request request = this->request(station::Call::kSetup, now_);
   request.resumed = resumed;
   request.seed = plan_.seed();

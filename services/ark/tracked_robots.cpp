@@ -28,7 +28,7 @@ std::span<const TrackerSample> TrackedRobots::samples_of(Tick now, std::int64_t 
   } else {
     for (TrackerInput::Stamped& stamped : arrived) {
       // What came before the run began to count waited for the run, not for its tick.
-      if (counts_) underway_.push_back({now + 1, stamped.arrival, taken});
+      if (counts_) underway_.push_back({now + 1, stamped.exposed, stamped.arrival, taken});
       samples_.push_back(std::move(stamped.sample));
     }
     heard_ += heard.size();
@@ -67,6 +67,7 @@ void TrackedRobots::acted(Tick now, Clock::time_point at) {
   const auto seconds = [](Clock::duration time) { return std::chrono::duration<double>(time).count(); };
   for (; !underway_.empty() && underway_.front().acts <= now; underway_.pop_front()) {
     const Underway& sample = underway_.front();
+    exposed_.add(seconds(at - sample.exposed));
     effect_.add(seconds(at - sample.arrival));
     wait_.add(seconds(sample.published - sample.arrival));
     step_.add(seconds(at - sample.published));
@@ -75,6 +76,8 @@ void TrackedRobots::acted(Tick now, Clock::time_point at) {
 
 void TrackedRobots::fill(TrackingTotals& totals) const {
   totals.trackers = input_.report();
+  totals.exposed_p50_s = exposed_.quantile_s(0.5);
+  totals.exposed_p99_s = exposed_.quantile_s(0.99);
   totals.effect_p50_s = effect_.quantile_s(0.5);
   totals.effect_p99_s = effect_.quantile_s(0.99);
   totals.wait_p50_s = wait_.quantile_s(0.5);

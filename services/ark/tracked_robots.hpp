@@ -33,7 +33,7 @@ class TrackedRobots {
  private:
   struct Underway {
     Tick acts;  ///< in the poses of this tick
-    Clock::time_point arrival, published;
+    Clock::time_point exposed, arrival, published;
   };
 
   TrackerInput input_;
@@ -44,6 +44,7 @@ class TrackedRobots {
       announced_;  ///< per robot: 1 + Membership that is announced and has not taken effect; 0: none
   std::deque<Underway> underway_;
   bool counts_ = false;                    ///< latencies: from the second tick on
+  LatencyHistogram exposed_;               ///< exposure to effect
   LatencyHistogram effect_, wait_, step_;  ///< arrival to effect, and its parts: to the publication, and from there
   std::uint64_t joined_ = 0, left_ = 0, lost_ = 0, heard_ = 0;
 };

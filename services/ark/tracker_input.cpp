@@ -80,6 +80,9 @@ bool TrackerInput::copy(const PublicTrackerFrame& from, TrackerSample& to, std::
         std::size_t{from.led._length}}) {
     if (length != n) return false;
   }
+  // Velocities are for observers, and may be left out.
+  if (from.vx_mm_s._length != from.vy_mm_s._length || (from.vx_mm_s._length != n && from.vx_mm_s._length != 0))
+    return false;
   std::set<std::uint32_t> seen;
   for (std::size_t i = 0; i < n; ++i) {
     const std::uint64_t robot = std::uint64_t{values(from.robot)[i]} + first_robot;
@@ -178,7 +181,7 @@ std::vector<TrackerInput::Stamped> TrackerInput::take(Clock::time_point now, std
     if (arrived.source >= sources_.size()) sources_.resize(arrived.source + 1);
     Source& source = sources_[arrived.source];
     if (source.name.empty())
-      source.name = trackers.empty() ? names[arrived.source] : trackers[arrived.source].source;
+      source.name = one_line(trackers.empty() ? names[arrived.source] : trackers[arrived.source].source);
     ++source.frames;
     const auto stamp = source.clock.take(arrived.time);
     watch(source, arrived);
@@ -187,7 +190,8 @@ std::vector<TrackerInput::Stamped> TrackerInput::take(Clock::time_point now, std
     source.way.add(static_cast<double>(arrived.time.arrival_ns - stamp->sent_ns) * 1e-9);
     const double age_s = static_cast<double>(ns_of(now) - stamp->capture_ns) * 1e-9;
     arrived.sample.capture_cycle = now_cycle - std::llround(age_s * pace * kNominalClockHz);
-    stamped.push_back({std::move(arrived.sample), arrived.arrival});
+    stamped.push_back({std::move(arrived.sample), Clock::time_point(std::chrono::nanoseconds(stamp->capture_ns)),
+                       arrived.arrival});
   }
   return stamped;
 }

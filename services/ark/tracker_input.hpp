@@ -27,7 +27,7 @@ class TrackerInput {
   /// A sample, and what is known of its way here.
   struct Stamped {
     TrackerSample sample;
-    Clock::time_point arrival;
+    Clock::time_point exposed, arrival;  ///< exposed: by the model of the source's clock
   };
   /// What has come since the last call, in the order of arrival. `now_cycle`: the simulated time at `now`; `pace`: simulated
   /// over wall time.

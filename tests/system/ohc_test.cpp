@@ -4,12 +4,15 @@
 #include <termios.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <csignal>
 #include <filesystem>
 #include <memory>
-#include <mutex>
+#include <optional>
 #include <random>
+#include <thread>
 
+#include "clients/ohc/line_clock.hpp"
 #include "clients/ohc/pseudo_terminal.hpp"
 #include "clients/ohc/serial_packet.hpp"
 #include "clients/ohc/serial_port.hpp"
@@ -65,7 +68,9 @@ class Ohc : public testing::Test {
   const std::uint32_t domain_;
 };
 
-constexpr std::uint8_t kWakeup = 0x85;
+constexpr std::uint8_t kWakeup = 0x85, kReadUid = 0x89;
+const OverheadPacket kRunPacket{OverheadCommand::kRepeat, {0, 0, 0, 0, 0, 0, 0, 0, 0, 0x88}};
+const OverheadPacket kStopPacket{};
 constexpr char kIdle = 1, kRunning = 4;  // kilolib's states
 
 TEST_F(Ohc, AStationProgramCommandsTheRobotsOfARun) {
@@ -99,11 +104,31 @@ TEST_F(Ohc, AStationProgramCommandsTheRobotsOfARun) {
         return life_cycles_become(kIdle);
       },
       90));
+  // While it sends a page, it is deaf.
+  std::atomic<bool> hears_again{false};
+  const dds::Participant participant({domain_, {}});
+  const dds::Reader<PublicOverheadPacket> packets(participant, topics::overhead_packets(),
+                                                  [&](const PublicOverheadPacket& packet, dds::SampleState state) {
+                                                    if (state.valid && packet.message[9] == kReadUid)
+                                                      hears_again = true;
+                                                  });
+  ohc::SerialPort serial(link);
+  ASSERT_EQ(serial.open(), "");
+  OverheadPacket page;
+  page.command = OverheadCommand::kBootPage;
+  EXPECT_TRUE(serial.send(page) && serial.send(kStopPacket));
+  EXPECT_TRUE(eventually([&] {
+    std::this_thread::sleep_for(std::chrono::duration<double>(ohc::kPage_s));
+    return serial.send({OverheadCommand::kOnce, {0, 0, 0, 0, 0, 0, 0, 0, 0, kReadUid}}) && hears_again;
+  }));
   ohc->signal(SIGTERM);
   const Outcome outcome = ohc->wait(30);
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_FALSE(fs::is_symlink(link)) << "the link goes with it";
   EXPECT_NE(outcome.out.find("WAKEUP, repeated"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("pages of a program"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.err.find("1 page"), std::string::npos) << outcome.err;
+  EXPECT_EQ(outcome.err.find(" stop"), std::string::npos) << outcome.err;
   EXPECT_EQ(outcome.out.find("RESET"), std::string::npos) << "wrong and cut packets count for nothing";
   EXPECT_NE(outcome.err.find(" wrong checksums"), std::string::npos) << outcome.err;
   run->signal(SIGINT);
@@ -133,44 +158,41 @@ TEST_F(Ohc, BadArgumentsAreRefused) {
   EXPECT_NE(missing.err.find("/nonexistent: cannot be opened"), std::string::npos) << missing.err;
 }
 
-/// Packets as the physical controller would take them.
+/// Packets as the physical controller would take them, at the speed of its line.
 class Controller {
  public:
   [[nodiscard]] const std::string& port() const { return terminal_.path(); }
   /// Whether such a packet arrives within a bound against hanging.
   [[nodiscard]] bool gets(const OverheadPacket& wanted) {
-    return eventually(
-        [&] {
-          for (const std::uint8_t octet : terminal_.read(0.05)) {
-            const auto packet = decoder_.take(octet);
-            if (!packet) continue;
-            last_ = *packet;
-            if (*packet == wanted) return true;
-          }
-          return false;
-        },
-        60);
+    return eventually([&] { return next() == wanted; }, 60);
   }
   /// Reads until nothing comes for a second; the last packet of all.
   [[nodiscard]] OverheadPacket last() {
     for (double quiet_s = now_s(); now_s() < quiet_s + 1;) {
-      for (const std::uint8_t octet : terminal_.read(0.05)) {
-        quiet_s = now_s();
-        if (const auto packet = decoder_.take(octet)) last_ = *packet;
-      }
+      if (next()) quiet_s = now_s();
     }
     return last_;
+  }
+  /// The next packet, if one comes within a moment.
+  std::optional<OverheadPacket> next() {
+    constexpr double kMoment_s = 0.005;
+    terminal_.hold_back(!line_.idle());
+    const std::vector<std::uint8_t> octets = terminal_.read(kMoment_s);
+    terminal_.hold_back(true);
+    line_.put(octets, now_s());
+    while (const auto octet = line_.take(now_s())) {
+      if (const auto packet = decoder_.take(octet->value)) return last_ = *packet;
+    }
+    return std::nullopt;
   }
   [[nodiscard]] const ohc::PacketDecoder::Counters& counters() const { return decoder_.counters(); }
 
  private:
   ohc::PseudoTerminal terminal_;
+  ohc::LineClock line_;
   ohc::PacketDecoder decoder_;
   OverheadPacket last_{OverheadCommand::kOnce, {}};
 };
-
-const OverheadPacket kRunPacket{OverheadCommand::kRepeat, {0, 0, 0, 0, 0, 0, 0, 0, 0, 0x88}};
-const OverheadPacket kStopPacket{};
 
 TEST_F(Ohc, APhysicalControllerDoesAsTheStationDoesAndStopsAtEveryEnding) {
   Controller controller;
@@ -209,6 +231,62 @@ TEST_F(Ohc, APhysicalControllerDoesAsTheStationDoesAndStopsAtEveryEnding) {
     run->wait(60);
   }
   EXPECT_EQ(controller.counters().bad_checksums, 0u);
+}
+
+/// DDS gives a process up after its lease of 30 s only; robots would do for so long what they were told last.
+TEST_F(Ohc, APhysicalControllerStopsWhenTheStationIsKilled) {
+  Controller controller;
+  auto ohc = start_ohc({"--serial", controller.port()});
+  ASSERT_TRUE(ohc->says("waiting for a run", 30));
+  const auto run = start_run();
+  ASSERT_TRUE(controller.gets(kStopPacket)) << "after RUN";
+  ASSERT_TRUE(ohc->says("run disperse", 30));
+  dds::Participant participant({domain_, {}});
+  dds::Writer<PublicOverheadPacket> packets(participant, topics::overhead_packets());
+  ASSERT_TRUE(eventually([&] { return packets.readers() > 0; }));
+  PublicOverheadPacket wakeup{};
+  std::string("test").copy(wakeup.client, sizeof wakeup.client - 1);
+  wakeup.request = 1;
+  wakeup.command = 2;
+  wakeup.message[9] = kWakeup;
+  packets.write(wakeup);
+  ASSERT_TRUE(controller.gets({OverheadCommand::kRepeat, {0, 0, 0, 0, 0, 0, 0, 0, 0, kWakeup}}));
+  // The launcher first, so that nobody ends the run in order or starts a new station.
+  std::vector<pid_t> processes = processes_with(scratch_ / "run");
+  ASSERT_GT(processes.size(), 1u);
+  for (const pid_t process : processes) kill(process, SIGSTOP);
+  for (const pid_t process : processes) kill(process, SIGKILL);
+  const double killed_s = now_s();
+  EXPECT_TRUE(controller.gets(kStopPacket));
+  EXPECT_LT(now_s() - killed_s, dds::kLease_s / 3);
+  EXPECT_TRUE(ohc->says("no status of the run for 1 s", 10));
+  EXPECT_EQ(controller.last(), kStopPacket);
+}
+
+/// Without a least interval the station sends 96 packets per second, and the line takes 29.
+TEST_F(Ohc, AStopIsPromptOnALineThatTheStationOverloads) {
+  write(scratch_ / "busy.txtpb", "duration_s: 600 robots { count: 100 behaviour: \"" +
+                                     source("behaviours/disperse.c") +
+                                     "\" layout { grid { pitch_mm: 40 } } } station { packet_interval_s: 0 "
+                                     "robot_interval_s: 0.1 environment { hub { } } }");
+  Controller controller;
+  auto ohc = start_ohc({"--serial", controller.port()});
+  ASSERT_TRUE(ohc->says("waiting for a run", 30));
+  Process run({program(), "run", scratch_ / "busy.txtpb", "--pace", "1", "--quiet", "--domain",
+               std::to_string(domain_), "--out", scratch_ / "run"},
+              scratch_.path());
+  const auto packets = [&] { return controller.counters().packets; };
+  ASSERT_TRUE(eventually([&] { return controller.next() && packets() > 100; }, 60));
+  ohc->signal(SIGTERM);
+  const std::uint64_t before = packets();
+  ASSERT_TRUE(controller.gets(kStopPacket));
+  // A pseudo-terminal takes some packets at once, so this allows for a second of the line. PacketQueue has the exact bound.
+  constexpr std::uint64_t kPerSecond = 29;
+  EXPECT_LE(packets() - before, kPerSecond);
+  const Outcome outcome = ohc->wait(30);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(outcome.err.find(", 0 dropped"), std::string::npos) << outcome.err;
+  EXPECT_EQ(controller.last(), kStopPacket);
 }
 
 }  // namespace

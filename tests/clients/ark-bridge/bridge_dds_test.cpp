@@ -17,15 +17,18 @@ TEST(ArkBridgeDds, FramesGoInAndOrdersComeOut) {
   const dds::Participant run(transport);
   std::mutex mutex;
   std::vector<std::pair<std::uint64_t, std::uint32_t>> frames;  // frame, robots
+  std::vector<float> speeds;                                    // along x, of the first robot
   const dds::Reader<PublicTrackerFrame> reader(run, topics::tracker_frames(),
                                                [&](const PublicTrackerFrame& sample, dds::SampleState state) {
                                                  if (!state.valid) return;
                                                  const std::lock_guard lock(mutex);
                                                  frames.emplace_back(sample.frame, sample.robot._length);
+                                                 if (sample.vx_mm_s._length == sample.robot._length)
+                                                   speeds.push_back(sample.vx_mm_s._buffer[0]);
                                                });
   dds::Writer<PublicStationPacket> station(run, topics::station_packets());
-  ArkBridge bridge(door("name: 'ark' ark {}", 4), transport);
-  const std::vector<ArkRobot> robots{{0, 1, 1, 0, 0, 0}, {1, 5, 5, 0, 0, 0}};
+  ArkBridge bridge(door("name: 'ark' ark { frame_rate_hz: 10 }", 4), transport);
+  const std::vector<ArkRobot> robots{{0, 1, 1, 0.5, 0, 0}, {1, 5, 5, 0, 0, 0}};
   PublicStationPacket packet{};
   packet.command = kRepeatCommand;
   const IrMessage message = ark::pack(std::vector<ark::ArkMessage>{{3, 7, 99}});
@@ -45,6 +48,7 @@ TEST(ArkBridgeDds, FramesGoInAndOrdersComeOut) {
   const std::lock_guard lock(mutex);
   ASSERT_GT(frames.size(), 2u);
   for (const auto& [frame, count] : frames) EXPECT_EQ(count, 2u);
+  EXPECT_EQ(speeds, std::vector<float>(frames.size(), 5));
   for (std::size_t i = 1; i < frames.size(); ++i) EXPECT_GT(frames[i].first, frames[i - 1].first);
 }
 

@@ -103,6 +103,21 @@ TEST(ArkBridge, PixelsBecomeMillimetresAndVelocitiesHeadings) {
   EXPECT_NEAR(robots[2].heading_rad, kPi / 2, 1e-12);
 }
 
+TEST(ArkBridge, VelocitiesPerFrameBecomeMillimetresPerSecond) {
+  Tally tally;
+  const std::vector<ArkRobot> robots{{0, 1, 1, 0.5, -0.25, 0}, {1, 9, 9, 1, 1, 0}, {2, 5, 5, 0, 0, 0}};
+  const Door d = door("name: 'ark' ark { frame_rate_hz: 20 } placement { turn_deg: 90 unit_mm: 2 }", 8);
+  const auto placed = tracked(robots, d, tally);
+  ASSERT_EQ(placed.size(), 3u);
+  // 20, 10 mm/s in the picture with y up, turned by 90 degrees.
+  EXPECT_NEAR(placed[0].vx_mm_s, -10, 1e-5);
+  EXPECT_NEAR(placed[0].vy_mm_s, 20, 1e-5);
+  EXPECT_TRUE(std::isnan(placed[1].vx_mm_s) && std::isnan(placed[1].vy_mm_s)) << "ARK has not seen it moving";
+  EXPECT_EQ(placed[2].vx_mm_s, 0) << "at rest is a velocity too";
+  const Door without = door("name: 'ark' ark {}", 8);
+  EXPECT_TRUE(std::isnan(tracked(robots, without, tally).at(0).vx_mm_s)) << "the rate is not known";
+}
+
 TEST(ArkBridge, ARobotThatDoesNotMoveHasNoHeading) {
   const Door d = door("name: 'ark' ark {}", 8);
   Tally tally;

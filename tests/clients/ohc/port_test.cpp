@@ -11,6 +11,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <memory>
 #include <vector>
 
@@ -155,6 +156,38 @@ TEST(ServePort, ForwardsPacketsAndEndsWithStop) {
   }
   EXPECT_EQ(next_packet(controller, decoder, pending), OverheadPacket{});
   EXPECT_EQ(decoder.counters().bad_checksums, 0u);
+}
+
+/// So that packets wait where they can still be dropped, and not in the guard's socket.
+TEST(ServePort, APacketIsConfirmedOnceTheLineHasTakenIt) {
+  PseudoTerminal controller;
+  PacketDecoder decoder;
+  std::vector<std::uint8_t> pending;
+  SerialPort port(controller.path());
+  ASSERT_EQ(port.open(), "");
+  const Guard guard([&](int socket) { serve_port(port, socket); });
+  port.close();
+  controller.hold_back(true);
+  const OverheadPacket packet{OverheadCommand::kOnce, {5}};
+  std::future<bool> confirmed = std::async(std::launch::async, send_packet, guard.socket(), packet);
+  EXPECT_EQ(confirmed.wait_for(std::chrono::milliseconds(200)), std::future_status::timeout);
+  controller.hold_back(false);
+  EXPECT_EQ(next_packet(controller, decoder, pending), packet);
+  EXPECT_TRUE(confirmed.get());
+}
+
+/// A controller that sends a page has its interrupts off, and would lose the octets of the next packet.
+TEST(ServePort, APageHasItsTime) {
+  PseudoTerminal controller;
+  SerialPort port(controller.path());
+  ASSERT_EQ(port.open(), "");
+  const Guard guard([&](int socket) { serve_port(port, socket); });
+  port.close();
+  const auto begin = Clock::now();
+  OverheadPacket page;
+  page.command = OverheadCommand::kBootPage;
+  ASSERT_TRUE(send_packet(guard.socket(), page));
+  EXPECT_GE(Clock::now() - begin, std::chrono::duration<double>(kPage_s));
 }
 
 TEST(ServePort, AKilledProcessIsFollowedByStop) {

@@ -72,6 +72,23 @@ TEST(MessageQueue, TheRateIsThatOfTheAirAndSharedEvenly) {
   }
 }
 
+/// Plugins and their users wait for the answer, whatever holds it up.
+TEST(MessageQueue, TheDelayCountsFromTheFirstRequest) {
+  constexpr Cycles kBin = kSecond / 100;
+  for (const auto& places : {environments(2), fields({{0, 4}, {4, 4}})}) {
+    MessageQueue queue(1, places, kSecond);
+    queue.put(0, {0, 0, 1}, 0);
+    EXPECT_TRUE(queue.take(0));
+    queue.put(0, {0, 0, 1}, 10 * kBin);
+    queue.put(0, {0, 0, 2}, 50 * kBin);  // replaces the first, which has waited since 0.1 s
+    EXPECT_FALSE(queue.take(99 * kBin));
+    EXPECT_TRUE(queue.take(100 * kBin));
+    std::vector<std::uint64_t> expected(queue.counts().delays.size());
+    expected[0] = expected[90] = 1;
+    EXPECT_EQ(queue.counts().delays, expected);
+  }
+}
+
 TEST(MessageQueue, BroadcastsGoFirstAndInOrder) {
   MessageQueue queue(2, environments(1), kSecond);
   queue.put(0, {1, 3, 5}, 0);

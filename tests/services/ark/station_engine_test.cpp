@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <random>
@@ -52,6 +53,28 @@ class Scene {
     station.step(now, {swarm_, external});
     station.emit(frame);
     ++now;
+  }
+  /// Of a scene with one part.
+  void place(std::uint32_t robot, double x_mm, double y_mm) {
+    bodies_[0].x_mm[robot] = x_mm;
+    bodies_[0].y_mm[robot] = y_mm;
+  }
+  void set_life(std::uint32_t robot, LifeCycle life) {
+    actuation_[0].life_cycle[robot] = static_cast<std::uint8_t>(life);
+  }
+  /// Steps for some ticks; the messages to one robot.
+  std::vector<ArkMessage> messages_to(std::uint16_t robot, int ticks) {
+    std::vector<ArkMessage> messages;
+    for (int k = 0; k < ticks; ++k) {
+      step();
+      for (const OverheadPacket& packet : frame.packets) {
+        if (packet.command != OverheadCommand::kRepeat || packet.message.back() != 0) continue;
+        for (const ArkMessage& message : unpack(packet.message)) {
+          if (message.id == robot) messages.push_back(message);
+        }
+      }
+    }
+    return messages;
   }
 
   StationEngine station;
@@ -162,6 +185,77 @@ TEST(StationEngine, TellsWhatTheTrackerSaw) {
     }
   }
   EXPECT_EQ(inside, 1u);  // the robot at (40, 0)
+}
+
+/// A camera that shows a frame every 100 s, and the first one at once.
+const std::string kSlowCamera =
+    "frame_rate_hz: 0.01 led_error: 0 dropped_frames: 0 losses_per_hour: 0 swaps_per_hour: 0 ";
+
+TEST(StationEngine, PluginsSeeWhatTheCameraShowsAndNotTheTruth) {
+  const RunPlan plan = plan_of(30, "station { camera { position_noise_mm: 60 " + kSlowCamera +
+                                       "} environment { hub { x_mm: 40 y_mm: 0 radius_mm: 60 } } }");
+  Scene scene(plan);
+  PluginBench hub("hub", plan.station_settings().environments[0].parameters, 30);
+  const SeenRobots seen = scene.station.seen();
+  int from_truth = 0, messages = 0;
+  for (int k = 0; k < 60; ++k) {
+    scene.step();
+    for (const OverheadPacket& packet : scene.frame.packets) {
+      if (packet.command != OverheadCommand::kRepeat || packet.message.back() != 0) continue;
+      for (const ArkMessage& message : unpack(packet.message)) {
+        if (message.id == kArkNobody) continue;
+        const Pose pose{seen.x_mm[message.id], seen.y_mm[message.id], seen.heading_rad[message.id]};
+        EXPECT_EQ(message, hub.sense({message.id, pose}).value());
+        from_truth += message == hub.sense({message.id, plan.initial_pose(message.id)}).value();
+        ++messages;
+      }
+    }
+  }
+  EXPECT_GE(messages, 30);
+  EXPECT_LE(from_truth, 3) << "of " << messages;
+}
+
+/// A tracked robot that joins late, is lost, and comes back elsewhere.
+TEST(StationEngine, ARobotThatIsAbsentIsNotSeenAndGetsNoMessages) {
+  for (const std::string camera : {"", "camera { led_error: 0 dropped_frames: 0 losses_per_hour: 0 } "}) {
+    const RunPlan plan = testing::make_plan(
+        "robots { count: 2 } robots { count: 1 body: TRACKED } tracking { start: WHEN_SEEN } station { " + camera +
+            "environment { hub { radius_mm: 300 } } }",
+        {{0, 0, 0}, {40, 0, 0}, {80, 0, 0}});
+    Scene scene(plan);
+    const auto is_seen = [&] { return scene.station.seen().seen[2] != 0; };
+    EXPECT_FALSE(is_seen()) << "when plugins are set up";
+    scene.set_life(2, LifeCycle::kAbsent);
+    EXPECT_TRUE(scene.messages_to(2, 100).empty());
+    EXPECT_FALSE(is_seen());
+    EXPECT_NE(scene.station.seen().seen[1], 0);
+    scene.place(2, 500, 100);
+    scene.set_life(2, LifeCycle::kRunning);
+    EXPECT_FALSE(scene.messages_to(2, 100).empty());
+    EXPECT_TRUE(is_seen());
+    EXPECT_NEAR(scene.station.seen().x_mm[2], 500, 10);
+    scene.set_life(2, LifeCycle::kAbsent);
+    static_cast<void>(scene.messages_to(2, 40));  // one may have waited
+    EXPECT_FALSE(is_seen());
+    EXPECT_TRUE(scene.messages_to(2, 100).empty());
+    // It is lifted to another place. That is no speed, also where the run is resumed in between.
+    proto::StationState part;
+    scene.station.save(part);
+    const proto::StationState* const parts[] = {&part};
+    Scene loaded(plan);
+    loaded.station.load(scene.now, parts);
+    loaded.now = scene.now;
+    for (Scene* const one : {&scene, &loaded}) {
+      one->place(2, -500, 100);
+      one->set_life(2, LifeCycle::kRunning);
+      for (int k = 0; k < 8 && one->station.seen().seen[2] == 0; ++k) one->step();
+      const SeenRobots& seen = one->station.seen();
+      EXPECT_NE(seen.seen[2], 0);
+      EXPECT_NEAR(seen.x_mm[2], -500, 10);
+      EXPECT_LT(std::hypot(seen.vx_mm[2], seen.vy_mm[2]), 60);
+    }
+    EXPECT_EQ(loaded.station.hash_part(), scene.station.hash_part());
+  }
 }
 
 TEST(StationEngine, FreesTheAirWhileNobodyIsDue) {

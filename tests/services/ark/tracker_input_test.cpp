@@ -29,6 +29,7 @@ struct Columns {
   std::vector<std::uint8_t> state{0}, led{255};
   std::vector<double> x{100}, y{-50}, heading{0.5};
   std::vector<float> xx{0.04f}, xy{0}, yy{0.04f}, heading_variance{0.001f};
+  std::vector<float> vx{}, vy{};
 };
 
 template <class Sequence, class Value> void point(Sequence& sequence, std::vector<Value>& values) {
@@ -51,6 +52,8 @@ PublicTrackerFrame sample_of(Columns& from) {
   point(sample.xy_mm2, from.xy);
   point(sample.yy_mm2, from.yy);
   point(sample.heading_variance_rad2, from.heading_variance);
+  point(sample.vx_mm_s, from.vx);
+  point(sample.vy_mm_s, from.vy);
   return sample;
 }
 
@@ -115,6 +118,23 @@ TEST_F(TrackerInputs, KeepOnlyEntriesThatCanBeUsed) {
   EXPECT_TRUE(std::isinf(sample.heading_variance_rad2[1])) << "a heading that is no number is not known";
 }
 
+TEST_F(TrackerInputs, VelocitiesMayBeLeftOutButNotHalfOfThem) {
+  Columns columns;
+  columns.vx = columns.vy = {1};
+  write(columns);
+  columns.vy.clear();
+  columns.frame = 2;
+  write(columns);
+  columns.vy = {1, 2};
+  columns.frame = 3;
+  write(columns);
+  std::set<std::uint64_t> frames;
+  for (const TrackerInput::Stamped& taken : take_all()) {
+    if (taken.sample.source == 0) frames.insert(taken.sample.frame);
+  }
+  EXPECT_EQ(frames, (std::set<std::uint64_t>{1}));
+}
+
 /// Whatever outsiders write, the station goes on, and what it takes is usable.
 TEST_F(TrackerInputs, OfAnyContentAreSurvived) {
   std::mt19937_64 random(5);
@@ -133,6 +153,9 @@ TEST_F(TrackerInputs, OfAnyContentAreSurvived) {
       column.clear();
       for (std::size_t i = length(); i > 0; --i) column.push_back(draw());
     };
+    if (below(4) == 0) {
+      for (auto* column : {&columns.vx, &columns.vy}) fill(*column, [&] { return static_cast<float>(value()); });
+    }
     fill(columns.robot, [&] { return static_cast<std::uint32_t>(below(10) == 0 ? random() : below(6)); });
     fill(columns.state, [&] { return static_cast<std::uint8_t>(below(6)); });
     fill(columns.led, [&] { return static_cast<std::uint8_t>(random()); });
