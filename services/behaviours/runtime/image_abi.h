@@ -141,7 +141,9 @@ struct KtSurroundings {
   uint8_t eeprom_filled;     /* 0 on entry; 1: eeprom_copy holds the default content */
   uint8_t eeprom_written;    /* 0 on entry; 1: the program has written to its EEPROM */
   uint8_t charging;          /* 1: a charger's voltage is on the robot's contacts */
-  uint8_t unused[5];
+  uint8_t led_changes;       /* 0 on entry; number of changes of the LED in this tick, at most 255 */
+  uint8_t led_sampled;       /* if there were changes: the LED at a random time of this tick */
+  uint8_t unused[3];
   uint8_t eeprom_copy[1024];
 };
 
