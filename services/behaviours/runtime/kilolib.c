@@ -225,9 +225,12 @@ void set_color(uint8_t color) {
   color &= 63;
   if (color == robot.led) return;
   struct KtSurroundings* around = kt_surroundings;
-  if (around->led_changes == 0) around->led_sampled = robot.led;
-  if (around->led_changes < 255) ++around->led_changes;
-  if (cycle_of_tick() <= sample_cycle()) around->led_sampled = color;
+  if (around->led_changes <= KT_MOST_FLASHES) {
+    if (around->led_changes++ == 0) around->led_sampled = robot.led;
+    if (cycle_of_tick() <= sample_cycle()) around->led_sampled = color;
+    /* Calls that change the LED are not skipped until it is known to flicker: which ones are executed must not matter. */
+    ++robot.effects;
+  }
   robot.led = color;
 }
 
