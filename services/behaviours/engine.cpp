@@ -366,6 +366,9 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
   }
   keep_eeprom(i, slot);
   note_outputs(i, robot, executor.tx_period());
+  // A flash within a tick is seen as often as it lasts. The end of the tick would always miss it, as callbacks run at its beginning.
+  const KtSurroundings& around = *slot.surroundings();
+  if (around.led_changes > 1 && around.led_changes <= KT_MOST_FLASHES) led_[i] = around.led_sampled & 63;
   if (slot.exchange()->overflows != 0) note_overflows(i, *slot.exchange(), program, slot);
   if (slot.exchange()->heap_full != 0) note_full_heap(i, *slot.exchange(), program, slot);
   if (slot.exchange()->ended != 0) {
@@ -542,6 +545,7 @@ void BehavioursEngine::set_surroundings(std::uint32_t i, const Slot& slot, std::
   around.receiving_from = 0;
   around.eeprom = eeprom_[i] ? eeprom_[i]->data() : nullptr;
   around.eeprom_filled = around.eeprom_written = 0;
+  around.led_changes = 0;
 }
 
 void BehavioursEngine::keep_eeprom(std::uint32_t i, const Slot& slot) {

@@ -126,6 +126,9 @@ struct KtExchange {
       heap_full; /* address after the call that asked the heap for more than it has; 0: none. The host sets it to 0 */
 };
 
+/* An LED that changes more often in a tick flickers with every call of loop(); its last colour counts. */
+#define KT_MOST_FLASHES 8u
+
 /* Sensors and EEPROM of the robot that runs, written by the host. Part of the slot, not of a robot's memory. Readings are
  * expected values of this robot's ADC, 10-bit counts; sd is the standard deviation of one reading. */
 struct KtSurroundings {
@@ -141,7 +144,9 @@ struct KtSurroundings {
   uint8_t eeprom_filled;     /* 0 on entry; 1: eeprom_copy holds the default content */
   uint8_t eeprom_written;    /* 0 on entry; 1: the program has written to its EEPROM */
   uint8_t charging;          /* 1: a charger's voltage is on the robot's contacts */
-  uint8_t unused[5];
+  uint8_t led_changes;       /* 0 on entry; changes of the LED in this tick, at most KT_MOST_FLASHES + 1 */
+  uint8_t led_sampled;       /* after 1..KT_MOST_FLASHES changes: the LED at a random time of this tick */
+  uint8_t unused[3];
   uint8_t eeprom_copy[1024];
 };
 

@@ -214,9 +214,24 @@ void spinup_motors(void) {
   delay(15);
 }
 
+/* A time of this tick, cycles. Random, but draws nothing from the generator. */
+static uint32_t sample_cycle(void) {
+  const uint64_t z = (robot.noise ^ kilo_ticks) * 0xbf58476d1ce4e5b9u;
+  return (uint32_t)(((z ^ z >> 31) * 0x94d049bb133111ebu >> 32) % robot.tick_cycles);
+}
+
 void set_color(uint8_t color) {
   charge(SET_COLOR_CYCLES);
-  robot.led = color & 63;
+  color &= 63;
+  if (color == robot.led) return;
+  struct KtSurroundings* around = kt_surroundings;
+  if (around->led_changes <= KT_MOST_FLASHES) {
+    if (around->led_changes++ == 0) around->led_sampled = robot.led;
+    if (cycle_of_tick() <= sample_cycle()) around->led_sampled = color;
+    /* Calls that change the LED are not skipped until it is known to flicker: which ones are executed must not matter. */
+    ++robot.effects;
+  }
+  robot.led = color;
 }
 
 /* The EEPROM of an ATmega328P, 1024 octets. */

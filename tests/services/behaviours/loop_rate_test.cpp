@@ -89,6 +89,23 @@ TEST(LoopRate, TheClockIsSeenInItsTick) {
   }
 }
 
+TEST(LoopRate, FlashesWithinATickAreSeenAsOftenAsTheyLast) {
+  // A flash of 20 ms per message, in ticks of 32.8 ms.
+  Robot robot(
+      "static volatile uint8_t is_new;\n"
+      "static void rx(message_t* m, distance_measurement_t* d) { is_new = 1; }\n"
+      "static void loop(void) { if (!is_new) return; is_new = 0; set_color(3); delay(20); set_color(0); }\n");
+  constexpr int kTicks = 400;
+  int seen = 0;
+  for (int k = 0; k < kTicks; ++k) {
+    Air air;
+    air.receptions = {{0, message(0)}};
+    robot.step(air);
+    seen += robot.led(0) != 0 ? 1 : 0;
+  }
+  EXPECT_NEAR(seen / double{kTicks}, 20 / 32.77, 0.08);
+}
+
 TEST(LoopRate, DelaysKeepTheirTime) {
   // Two states that are equal before and after each call: their delays must not be skipped.
   Robot robot("static void loop(void) { set_color(1); delay(500); set_color(0); delay(500); }\n");
