@@ -81,6 +81,21 @@ TEST_F(RunReport, HasNoCurvesWithoutGnuplotAndSaysSo) {
   EXPECT_EQ(page().find("class=\"plot\""), std::string::npos);
 }
 
+TEST_F(RunReport, HasTheTotalsOfStationAndTrackers) {
+  ASSERT_EQ(run({"--mode", "local", "--quiet"}).status, 0);
+  recorder::Summary summary = recorder::read_summary(scratch.path() / "run/summary.json");
+  summary.station.plugins = {{"fields", "slower than <real> time"}};
+  summary.station.packets = 1234;
+  summary.tracked = true;
+  summary.tracking.joined = 8;
+  summary.tracking.trackers.push_back({.source = "ceiling", .frames = 4321, .dropped = 17});
+  summary.monitor = R"({"alarms": [{}, {}]})";
+  recorder::write_summary(summary, scratch.path() / "run/summary.json");
+  ASSERT_EQ(kilotwin({"export", scratch / "run", "--report", scratch / "run/report.html"}, scratch).status, 0);
+  expect_texts(page(), {"plugin fields", "slower than &lt;real&gt; time", "1234", "8 joined",
+                        "<td>ceiling</td><td>4321</td><td>17</td>", "2 alarms, in alarms.txt"});
+}
+
 TEST_F(RunReport, SaysWhyARunFailed) {
   for (const char* mode : {"local", "federated"}) {
     Process paced({program(), "run", scratch / "e.txtpb", "--mode", mode, "--duration", "600", "--pace", "1",
