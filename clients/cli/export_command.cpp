@@ -11,6 +11,7 @@
 #include "clients/cli/commands.hpp"
 #include "clients/cli/export_model.hpp"
 #include "clients/cli/prepare.hpp"
+#include "clients/cli/run_report.hpp"
 #include "clients/identify/kilogrid/export_cells.hpp"
 #include "clients/mcap/export_mcap.hpp"
 #include "clients/recorder/export.hpp"
@@ -18,12 +19,13 @@
 #include "clients/recorder/summary.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
+#include "core/os/files.hpp"
 
 namespace kilotwin::cli {
 namespace {
 
 struct ExportArguments {
-  std::filesystem::path run, trajectories, bodies, messages, radio, cells, mcap, model;
+  std::filesystem::path run, trajectories, bodies, messages, radio, cells, mcap, model, report;
   std::filesystem::path variables, events, commands, observables, environment, pogosim;
   double every_s = 1;
   bool measured = false;
@@ -55,17 +57,24 @@ int export_run(const ExportArguments& arguments) {
       &arguments.observables,  &arguments.environment, &arguments.pogosim,  &arguments.mcap};
   const bool rows_wanted =
       std::any_of(tables.begin(), tables.end(), [](const auto* table) { return !table->empty(); });
-  if (!rows_wanted && arguments.model.empty()) {
+  if (!rows_wanted && arguments.model.empty() && arguments.report.empty()) {
     throw UserError(
         "export: nothing to export; give --trajectories FILE, --variables FILE, --events FILE, --commands FILE, "
         "--observables FILE, --environment FILE, --bodies FILE, --messages FILE, --radio FILE, --cells FILE, "
-        "--pogosim FILE, --mcap FILE, --model FILE or several; a table ends in .csv, .csv.gz, .npz or .arrow");
+        "--pogosim FILE, --mcap FILE, --model FILE, --report FILE or several; a table ends in .csv, .csv.gz, .npz "
+        "or "
+        ".arrow");
   }
   if (!arguments.model.empty()) {
     const auto run = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kManifest);
     fmt::print("{}: {} robots\n", arguments.model.string(), export_model(read_manifest(run), arguments.model));
-    if (!rows_wanted) return kDone;
   }
+  if (!arguments.report.empty()) {
+    const auto run = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kManifest);
+    os::write_file(arguments.report, run_report(run));
+    fmt::print("{}: the page of the run\n", arguments.report.string());
+  }
+  if (!rows_wanted) return kDone;
   if (arguments.mcap == "-") throw UserError("--mcap -: needs a file; give --mcap FILE.mcap");
   if (std::count_if(tables.begin(), tables.end(), [](const auto* table) { return *table == "-"; }) > 1)
     throw UserError("export: two tables to standard output; give a file for all but one");
@@ -164,6 +173,9 @@ Command add_export(CLI::App& program) {
                "trajectories as the tracker sees them: with the model's measurement effects");
   app.add_option("--model", arguments->model,
                  "the model as it ran, with each robot's own parameters; `run --model` reads it")
+      ->type_name("FILE");
+  app.add_option("--report", arguments->report,
+                 "the page of the run, report.html, as `kilotwin run` writes it without --quiet")
       ->type_name("FILE");
   app.footer("Example: kilotwin export runs/disperse-1 --trajectories poses.csv");
   return {&app, [arguments] { return export_run(*arguments); }};

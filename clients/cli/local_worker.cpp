@@ -10,6 +10,7 @@
 #include "clients/cli/progress.hpp"
 #include "clients/cli/recovery.hpp"
 #include "clients/cli/run_recorder.hpp"
+#include "clients/cli/run_report.hpp"
 #include "clients/local/local_run.hpp"
 #include "core/base/error.hpp"
 #include "services/behaviours/program_set.hpp"
@@ -39,6 +40,7 @@ void run_in_this_process(const RunPlan& plan, const recorder::RunDirectory& dire
       std::chrono::duration<double>(run_recorder.first_tick_at().time_since_epoch()).count();
   run_recorder.finish(totals, first_tick_s - started_s);
   if (!totals.failure.empty()) {
+    if (!quiet) write_run_report(directory);
     throw RunError(fmt::format("{}; what was recorded so far is in {}", totals.failure, directory.path().string()));
   }
 }

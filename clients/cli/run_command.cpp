@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <csignal>
+#include <cstdio>
 #include <memory>
 #include <optional>
 #include <thread>
@@ -14,6 +15,7 @@
 #include "clients/cli/prepare.hpp"
 #include "clients/cli/recovery.hpp"
 #include "clients/cli/run_arguments.hpp"
+#include "clients/cli/run_report.hpp"
 #include "clients/cli/shell_words.hpp"
 #include "clients/cli/worker.hpp"
 #include "clients/recorder/summary.hpp"
@@ -104,6 +106,7 @@ os::Process start_view(const recorder::RunDirectory& directory, std::uint32_t do
 }
 
 void view_until_interrupted(os::Process& page) {
+  std::fflush(stdout);  // the summary comes first, in a pipe too
   say("kilotwin: the page now shows the recording; Ctrl-C ends it");
   while (interrupted() == 0 && !page.poll()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
   page.signal(SIGTERM);
@@ -153,8 +156,12 @@ int run(const RunOptions& arguments, double started_s) {
     const int status = launch(plan, prepared.directory,
                               {claim->domain(), started_s, arguments.give_up_after_s, !arguments.quiet,
                                arguments.realtime, monitor_words(arguments.monitor)});
-    if (status != 0) return status;
+    if (status != 0) {
+      if (!arguments.quiet) write_run_report(prepared.directory);
+      return status;
+    }
   }
+  if (!arguments.quiet) write_run_report(prepared.directory);
   if (!arguments.quiet || arguments.strict) {
     const recorder::Summary summary = recorder::read_summary(prepared.directory.summary());
     const std::string place = place_in_words(prepared.directory.path(), arguments.output,

@@ -210,6 +210,7 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   summary.cpu_s = totals.cpu_s;
   summary.peak_memory_mib = totals.peak_memory_mib;
   summary.state_hash = totals.state_hash;
+  summary.failure = totals.failure;
   summary.messages = {totals.attempted, totals.sent, totals.received, totals.collided};
   for (const RadioCount& radio : totals.radios) summary.per_robot.add(radio);
   summary.robots_failed = totals.robots_failed;

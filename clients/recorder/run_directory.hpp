@@ -10,6 +10,7 @@
 ///   alarms.csv, .txt alarms of the residual monitor as a table and as lines; alarms-replayed.*: of the last replay
 ///   picture.svg      clients/recorder/picture.hpp
 ///   animation.svg    clients/recorder/animation.hpp
+///   report.html      what happened, on one page: clients/cli/run_report.hpp
 ///   checkpoints/     one directory per checkpoint, named by its tick
 #pragma once
 
@@ -53,6 +54,7 @@ class RunDirectory {
   [[nodiscard]] std::filesystem::path alarms() const { return directory_ / "alarms.csv"; }
   [[nodiscard]] std::filesystem::path picture() const { return directory_ / "picture.svg"; }
   [[nodiscard]] std::filesystem::path animation() const { return directory_ / "animation.svg"; }
+  [[nodiscard]] std::filesystem::path report() const { return directory_ / "report.html"; }
 
   /// Throws RunError if it cannot be written.
   void write_manifest(const proto::Manifest& manifest) const;

@@ -156,6 +156,110 @@ std::vector<FederateTime> federates_of(const Json& json) {
   return federates;
 }
 
+Summary::PerRobot per_robot_of(const Json& json, std::uint32_t robots) {
+  const auto spread = [&](const char* name) {
+    const Json one = json.value(name, Json::object());
+    return Summary::PerRobot::Spread{one.value("least", 0u), one.value("most", 0u),
+                                     static_cast<std::uint64_t>(std::llround(one.value("mean", 0.0) * robots))};
+  };
+  return {
+      robots, spread("attempted"), spread("sent"), spread("received"), spread("collided"), spread("backed_off")};
+}
+
+std::vector<Summary::Failure> failures_of(const Json& json) {
+  std::vector<Summary::Failure> failures;
+  for (const Json& one : json) {
+    failures.push_back(
+        {one.at("robot").get<std::uint32_t>(), one.at("time_s").get<double>(), one.at("what").get<std::string>()});
+  }
+  return failures;
+}
+
+StationTotals station_of(const Json& json) {
+  const Json delay = json.value("queueing_delay_s", Json::object());
+  StationTotals station;
+  station.packets = json.value("packets", std::uint64_t{0});
+  station.robot_messages = json.value("robot_messages", std::uint64_t{0});
+  station.broadcasts = json.value("broadcasts", std::uint64_t{0});
+  station.replaced = json.value("replaced", std::uint64_t{0});
+  station.too_wide = json.value("too_wide", std::uint64_t{0});
+  if (const double rate = json.value("robot_messages_per_s", 0.0); rate > 0)
+    station.sending_s = static_cast<double>(station.robot_messages) / rate;
+  station.mean_delay_s = delay.value("mean", 0.0);
+  station.p99_delay_s = delay.value("p99", 0.0);
+  station.max_delay_s = delay.value("max", 0.0);
+  for (const Json& plugin : json.at("plugins"))
+    station.plugins.push_back({plugin.at("name").get<std::string>(), plugin.at("failure").get<std::string>()});
+  return station;
+}
+
+/// The percentiles {p50, p99} of a field in ms, as s.
+std::pair<double, double> percentiles_s(const Json& json, const char* name) {
+  const Json both = json.value(name, Json::object());
+  return {both.value("p50", 0.0) / 1e3, both.value("p99", 0.0) / 1e3};
+}
+
+TrackingTotals tracking_of(const Json& json) {
+  TrackingTotals t;
+  std::tie(t.effect_p50_s, t.effect_p99_s) = percentiles_s(json, "arrival_to_effect_ms");
+  std::tie(t.wait_p50_s, t.wait_p99_s) = percentiles_s(json, "arrival_to_publication_ms");
+  std::tie(t.step_p50_s, t.step_p99_s) = percentiles_s(json, "publication_to_effect_ms");
+  t.heard = json.value("heard_messages", std::uint64_t{0});
+  t.joined = json.value("joined", std::uint64_t{0});
+  t.left = json.value("left", std::uint64_t{0});
+  t.lost = json.value("lost", std::uint64_t{0});
+  t.jumps = json.value("jumps", std::uint64_t{0});
+  t.bodies_without_space = json.value("bodies_without_space", std::uint64_t{0});
+  for (const Json& one : json.value("trackers", Json::array())) {
+    TrackerReport& tracker = t.trackers.emplace_back();
+    tracker.source = one.value("source", "");
+    tracker.frames = one.value("frames", std::uint64_t{0});
+    tracker.dropped = one.value("dropped", std::uint64_t{0});
+    tracker.refused = one.value("refused", std::uint64_t{0});
+    tracker.restarts = one.value("restarts", 0u);
+    tracker.offset_s = one.value("offset_s", 0.0);
+    tracker.drift_ppm = one.value("drift_ppm", 0.0);
+    std::tie(tracker.own_p50_s, tracker.own_p99_s) = percentiles_s(one, "exposure_to_sent_ms");
+    std::tie(tracker.way_p50_s, tracker.way_p99_s) = percentiles_s(one, "queueing_ms");
+  }
+  return t;
+}
+
+/// Fields of summary.json beyond the contract, which may be missing.
+void read_further_fields(const Json& json, Summary& s) {
+  const Json none = Json::object();
+  s.hosts = json.value("hosts", 1u);
+  s.resumed_from_tick = json.value("resumed_from_tick", std::int64_t{0});
+  s.recovered_from_tick = json.value("recovered_from_tick", std::int64_t{0});
+  s.cpu_s = json.value("cpu_s", 0.0);
+  s.peak_memory_mib = json.value("peak_memory_mib", 0.0);
+  s.failure = json.value("failure", "");
+  s.per_robot = per_robot_of(json.value("messages_per_robot", none), s.robots);
+  s.failures = failures_of(json.value("failures", Json::array()));
+  if (const auto observables = json.find("observables"); observables != json.end()) {
+    for (const auto& [name, value] : observables->items())
+      s.observables.emplace_back(name, value.is_number() ? value.get<double>() : std::nan(""));
+  }
+  if (const auto station = json.find("station"); station != json.end()) s.station = station_of(*station);
+  s.paced = json.contains("late_ticks");
+  s.lateness.late_ticks = json.value("late_ticks", std::uint64_t{0});
+  s.lateness.worst_s = json.value("worst_lateness_ms", 0.0) / 1e3;
+  s.tracked = json.contains("tracking");
+  if (s.tracked) s.tracking = tracking_of(json.at("tracking"));
+  if (const auto monitor = json.find("monitor"); monitor != json.end()) s.monitor = monitor->dump();
+  const Json moved = json.value("moved_mm", none);
+  s.moved_mm = {moved.value("mean", 0.0), moved.value("max", 0.0)};
+  const Json cost = json.value("cost_ns_per_robot_tick", none);
+  s.cost_ns_per_robot_tick = {cost.value("behaviours", 0.0), cost.value("physics", 0.0),
+                              cost.value("radio", 0.0),      cost.value("station", 0.0),
+                              cost.value("exchange", 0.0),   cost.value("recording", 0.0)};
+  if (const auto federates = json.find("federates"); federates != json.end())
+    s.federates = federates_of(*federates);
+  s.provenance = {json.value("version", ""), json.value("build", ""),
+                  json.value("date", ""),    json.value("command_line", std::vector<std::string>{}),
+                  json.value("host", ""),    json.value("cores", 0u)};
+}
+
 }  // namespace
 
 void write_summary(const Summary& s, const std::filesystem::path& file) {
@@ -202,6 +306,7 @@ void write_summary(const Summary& s, const std::filesystem::path& file) {
       {"host", s.provenance.host},
       {"cores", s.provenance.cores},
   };
+  if (!s.failure.empty()) json["failure"] = s.failure;
   for (const auto& [name, value] : s.observables) json["observables"][name] = value;
   if (!s.federates.empty()) json["federates"] = federates_json(s.federates);
   if (!s.station.plugins.empty()) json["station"] = station_json(s.station);
@@ -235,34 +340,8 @@ Summary read_summary(const std::filesystem::path& file) {
     messages.at("received").get_to(s.messages.received);
     messages.at("collided").get_to(s.messages.collided);
     json.at("robots_failed").get_to(s.robots_failed);
-    if (json.contains("observables")) {
-      for (const auto& [name, value] : json.at("observables").items())
-        s.observables.emplace_back(name, value.is_number() ? value.get<double>() : std::nan(""));
-    }
-    if (const auto station = json.find("station"); station != json.end()) {
-      for (const Json& plugin : station->at("plugins"))
-        s.station.plugins.push_back(
-            {plugin.at("name").get<std::string>(), plugin.at("failure").get<std::string>()});
-    }
     json.at("recoveries").get_to(s.recoveries);
-    // The other fields are not part of the contract and may be missing.
-    s.hosts = json.value("hosts", 1u);
-    s.resumed_from_tick = json.value("resumed_from_tick", std::int64_t{0});
-    s.recovered_from_tick = json.value("recovered_from_tick", std::int64_t{0});
-    s.cpu_s = json.value("cpu_s", 0.0);
-    s.peak_memory_mib = json.value("peak_memory_mib", 0.0);
-    const Json none = Json::object();
-    const Json moved = json.value("moved_mm", none);
-    s.moved_mm = {moved.value("mean", 0.0), moved.value("max", 0.0)};
-    const Json cost = json.value("cost_ns_per_robot_tick", none);
-    s.cost_ns_per_robot_tick = {cost.value("behaviours", 0.0), cost.value("physics", 0.0),
-                                cost.value("radio", 0.0),      cost.value("station", 0.0),
-                                cost.value("exchange", 0.0),   cost.value("recording", 0.0)};
-    if (const auto federates = json.find("federates"); federates != json.end())
-      s.federates = federates_of(*federates);
-    s.provenance = {json.value("version", ""), json.value("build", ""),
-                    json.value("date", ""),    json.value("command_line", std::vector<std::string>{}),
-                    json.value("host", ""),    json.value("cores", 0u)};
+    read_further_fields(json, s);
     return s;
   } catch (const std::exception& error) {
     throw UserError(fmt::format("{}: not a summary; expected the summary.json of a run directory ({})",
@@ -326,8 +405,8 @@ std::string summary_text(const Summary& s, const std::string& place) {
        fmt::format("{} s of CPU time, {} MiB of memory", short_number(s.cpu_s), short_number(s.peak_memory_mib)));
   line("hash", fmt::format("{:016x}", s.state_hash));
   const bool moves = s.robots <= Film::kMostRobots;
-  line("results",
-       fmt::format("{}: summary.json, picture.svg, {}recording.ktrec", place, moves ? "animation.svg, " : ""));
+  line("results", fmt::format("{}: report.html, summary.json, picture.svg, {}recording.ktrec", place,
+                              moves ? "animation.svg, " : ""));
   return text;
 }
 

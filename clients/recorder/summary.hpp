@@ -29,6 +29,7 @@ struct Summary {
   double cpu_s = 0;                      ///< of all processes of the run
   double peak_memory_mib = 0;            ///< of all processes of the run, resident
   std::uint64_t state_hash = 0;          ///< 16 hex digits in the file
+  std::string failure;  ///< one line: why the run failed; empty, and not in the file, if it did not
   struct Messages {
     std::uint64_t attempted = 0, sent = 0, received = 0, collided = 0;
   } messages;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <utility>
@@ -38,8 +39,9 @@ std::string with_unit(std::string_view name) {
 
 std::string mark_of(std::size_t plot) { return fmt::format("<plot {}>", plot); }
 
-std::string image(std::string_view svg, std::string_view alt) {
-  return fmt::format("<img alt=\"{}\" src=\"data:image/svg+xml;base64,{}\">", escaped(alt), base64(svg));
+std::string image(std::string_view svg, std::string_view alt, Ground ground) {
+  return fmt::format("<img{} alt=\"{}\" src=\"data:image/svg+xml;base64,{}\">",
+                     ground == Ground::kPage ? " class=\"plot\"" : "", escaped(alt), base64(svg));
 }
 
 void Table::row(const std::vector<std::string>& cells) {
@@ -58,6 +60,21 @@ std::string Table::text(std::string_view kind) const {
   table.set("heads", heads);
   table.set("rows", rows);
   return rendered(templates::kTable, table);
+}
+
+std::string bars(const std::vector<Bar>& bars, double longest) {
+  if (!(longest > 0)) return "";
+  Data list{Data::type::list}, all{Data::type::object};
+  for (const Bar& bar : bars) {
+    Data one{Data::type::object};
+    one.set("what", bar.what);
+    one.set("kind", bar.kind);
+    one.set("percent", fmt::format("{:.1f}", std::clamp(100 * bar.length / longest, 0.0, 100.0)));
+    one.set("value", bar.value);
+    list << one;
+  }
+  all.set("bars", list);
+  return rendered(templates::kBars, all);
 }
 
 std::string page(std::string_view title, std::string_view body) {

@@ -18,8 +18,10 @@ namespace kilotwin::html {
 
 /// Placeholder of a plot until it is drawn. Escaped text cannot contain it.
 [[nodiscard]] std::string mark_of(std::size_t plot);
+/// What an image stands on. Plots are transparent: a dark page inverts their ink. Pictures bring a light ground.
+enum class Ground { kPage, kOwn };
 /// An inline image.
-[[nodiscard]] std::string image(std::string_view svg, std::string_view alt);
+[[nodiscard]] std::string image(std::string_view svg, std::string_view alt, Ground ground = Ground::kPage);
 
 /// Values for the names of a template.
 using Data = kainjow::mustache::data;
@@ -38,6 +40,15 @@ class Table {
   std::vector<std::string> heads_;
   std::vector<Data> rows_;
 };
+
+struct Bar {
+  std::string what;
+  std::string kind;   ///< its colour: "before", "after" or "floor"
+  double length = 0;  ///< from 0
+  std::string value;  ///< markup
+};
+/// Horizontal bars. `longest`: the length that fills the width; without a positive one there are no bars.
+[[nodiscard]] std::string bars(const std::vector<Bar>& bars, double longest);
 
 /// The whole document around `body`, with its style sheet.
 [[nodiscard]] std::string page(std::string_view title, std::string_view body);

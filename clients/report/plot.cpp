@@ -16,7 +16,6 @@ namespace {
 
 using recorder::svg::kPalette;
 
-constexpr int kWidth_px = 720, kHeight_px = 460;
 constexpr double kText_px = 12;
 /// Above this number of points, symbols would hide the line.
 constexpr std::size_t kMostPoints = 40;
@@ -130,7 +129,10 @@ std::string commands_of(const Plot& plot) {
   const bool y_logarithmic = logarithmic(plot.y_logarithmic, extent.y);
   const bool legend = plot.series.size() > 1 || (plot.series.size() == 1 && !plot.series[0].name.empty());
 
-  std::string out = "set lmargin 11\nset rmargin 3\nset tmargin at screen 0.79\nset bmargin 4\nset format '%h'\n";
+  const bool bare = plot.title.empty() && plot.subtitle.empty() && !legend;
+  std::string out =
+      fmt::format("set lmargin 11\nset rmargin 3\nset tmargin at screen {}\nset bmargin 4\nset format '%h'\n",
+                  bare ? 0.95 : 0.79);
   out += fmt::format("set label 1 {} at screen 0.04,0.94 font ',17' textcolor rgb '{}'\n",
                      gnuplot_text(recorder::svg::shortened(plot.title, kLongestTitle)), recorder::svg::kInk);
   out +=
@@ -139,7 +141,7 @@ std::string commands_of(const Plot& plot) {
   if (legend) {
     // The title is a label beside the key: inside the key, gnuplot would give it a line of its own.
     const std::string title = plot.legend_title.empty() ? "" : plot.legend_title + ":";
-    const double from = 0.03 + recorder::svg::text_width_px(title, kText_px) / kWidth_px;
+    const double from = 0.03 + recorder::svg::text_width_px(title, kText_px) / plot.width_px;
     out += fmt::format("set label 3 {} at screen 0.04,0.83 textcolor rgb '{}'\n", gnuplot_text(title),
                        recorder::svg::kInk);
     out +=
@@ -177,7 +179,7 @@ std::string commands_of(const Plot& plot) {
 }  // namespace
 
 std::size_t add_plot(Gnuplot& plots, const Plot& plot) {
-  return plots.add(kWidth_px, kHeight_px, commands_of(plot));
+  return plots.add(plot.width_px, plot.height_px, commands_of(plot));
 }
 
 std::string plot_svg(const Plot& plot) {

@@ -19,7 +19,8 @@ struct PlotSeries {
 };
 
 struct Plot {
-  std::string title;
+  int width_px = 720, height_px = 460;
+  std::string title;           ///< without title, subtitle and legend, the axes have their room
   std::string subtitle;        ///< small, below the title: meaning of the bars, number of runs
   std::string legend_title;    ///< common heading of the series' names
   std::string x_name, x_unit;  ///< unit "": none

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "clients/report/html.hpp"
+#include "clients/report/templates.hpp"
 
 namespace kilotwin::identify::report {
 namespace {
@@ -75,49 +76,68 @@ const json* plot_for(const json& effect, const json& plots) {
 
 }  // namespace
 
+namespace {
+
+/// The facts of an effect. Values are markup.
+html::Data facts_of(const json& effect) {
+  html::Data list{html::Data::type::list};
+  const auto fact = [&](const std::string& name, const std::string& value) {
+    html::Data one{html::Data::type::object};
+    one.set("fact", name);
+    one.set("value", value);
+    list << one;
+  };
+  fact("acts on", acts_on_of(effect));
+  if (const json& facts = part(effect, "facts"); facts.is_object()) {
+    for (const auto& [name, value] : facts.items()) fact(name, escaped(value.get<std::string>()));
+    return list;
+  }
+  if (const auto share = number(effect, "share_removed"))
+    fact("removes", percent(share) + " of the mean square error");
+  if (const auto without = number(effect, "rmse_without_mm"))
+    fact("without it", "error " + figure(without) + " mm");
+  const json& evidence = part(effect, "evidence");
+  const auto family = number(evidence, "p_family");
+  const auto log10_p = family ? std::log10(std::max(*family, 1e-300)) : number(evidence, "log10_p");
+  if (log10_p) fact("p value", chance(log10_p));
+  return list;
+}
+
+/// The fitted maps and curves of an effect, as markup.
+std::string fitted_plots(const json& effect, const json& document, Figures& figures) {
+  std::string plots;
+  const std::string name = text(effect, "name");
+  if (name.empty()) return plots;
+  for (const json& map : part(document, "effect_maps")) {
+    if (text(map, "name") == name)
+      plots += figures.place(plot_effect_map(figures.plots(), map), "The fitted effect");
+  }
+  for (const json& curve : part(document, "effect_curves")) {
+    if (text(curve, "name") == name)
+      plots += figures.place(plot_effect(figures.plots(), curve), "The fitted effect");
+  }
+  return plots;
+}
+
+}  // namespace
+
 std::string cards(const json& contract, const json& document, Figures& figures) {
   const json& covariate_plots = part(document, "covariate_plots");
   std::string out;
   std::set<const json*> shown;
   for (const json& effect : part(contract, "effects")) {
-    const json& evidence = part(effect, "evidence");
     std::string words = text(effect, "in_words");
     if (words.empty()) words = fmt::format("{} depends on {}.", acts_on_of(effect), covariates_of(effect));
-    out += "<article class=\"effect\"><div>";
-    out += fmt::format("<h3>{}</h3><p>{}</p>", escaped(covariates_of(effect)), escaped(words));
-    out += "<dl>";
-    const auto fact = [&](const char* name, const std::string& value) {
-      out += fmt::format("<dt>{}</dt><dd>{}</dd>", name, value);
-    };
-    fact("acts on", acts_on_of(effect));
-    if (const json& facts = part(effect, "facts"); facts.is_object()) {
-      for (const auto& [name, value] : facts.items())
-        out += fmt::format("<dt>{}</dt><dd>{}</dd>", escaped(name), escaped(value.get<std::string>()));
-    } else {
-      if (number(effect, "share_removed"))
-        fact("removes", percent(number(effect, "share_removed")) + " of the mean square error");
-      if (number(effect, "rmse_without_mm"))
-        fact("without it", "error " + figure(number(effect, "rmse_without_mm")) + " mm");
-      const auto family = number(evidence, "p_family");
-      const auto log10_p = family ? std::log10(std::max(*family, 1e-300)) : number(evidence, "log10_p");
-      if (log10_p) fact("p value", chance(log10_p));
-    }
-    out += "</dl></div>";
-    out += "<div>";
-    std::string plots;
-    for (const json& map : part(document, "effect_maps")) {
-      if (text(map, "name") == text(effect, "name") && !text(effect, "name").empty())
-        plots += figures.place(plot_effect_map(figures.plots(), map), "The fitted effect");
-    }
-    for (const json& curve : part(document, "effect_curves")) {
-      if (text(curve, "name") == text(effect, "name") && !text(effect, "name").empty())
-        plots += figures.place(plot_effect(figures.plots(), curve), "The fitted effect");
-    }
+    std::string plots = fitted_plots(effect, document, figures);
     const json* plot = covariate_plots.is_array() && plots.empty() ? plot_for(effect, covariate_plots) : nullptr;
     if (plot != nullptr && shown.insert(plot).second)
-      plots += figures.place(plot_covariate(figures.plots(), *plot), "Residuals without the effect");
-    out += plots;
-    out += "</div></article>\n";
+      plots = figures.place(plot_covariate(figures.plots(), *plot), "Residuals without the effect");
+    html::Data card{html::Data::type::object};
+    card.set("depends_on", covariates_of(effect));
+    card.set("words", words);
+    card.set("facts", facts_of(effect));
+    card.set("plots", plots);
+    out += html::rendered(html::templates::kEffect, card);
   }
   return out;
 }

@@ -132,47 +132,44 @@ std::string verdict(const json& contract) {
   return out;
 }
 
+namespace {
+
+/// "<b>1.2 mm</b> <small>1.1 to 1.3 (95 %)</small>", as markup.
+std::string with_interval(std::optional<double> value, const std::string& unit, std::optional<double> low,
+                          std::optional<double> high) {
+  std::string out = fmt::format("<b>{} {}</b>", figure(value), escaped(unit));
+  if (low && high) out += fmt::format(" <small>{} to {} (95 %)</small>", figure(low), figure(high));
+  return out;
+}
+
+}  // namespace
+
 std::string bars(const json& contract) {
   const Errors e = errors_of(contract);
   if (!e.before || !e.after) return "";
   const double most = std::max(
       {*e.before, *e.after, e.floor.value_or(0), number(part(contract, "before"), "rmse_high_mm").value_or(0)});
-  if (most <= 0) return "";
-  const auto bar = [&](const char* kind, const char* name, double value, const json& from) {
-    const auto low = number(from, "rmse_low_mm"), high = number(from, "rmse_high_mm");
-    const std::string interval =
-        low && high ? fmt::format("<small>{} to {} (95 %)</small>", figure(low), figure(high)) : "";
-    return fmt::format(
-        "<div class=\"bar\"><span class=\"what\">{}</span><span class=\"track\"><span class=\"fill {}\" "
-        "style=\"width:{:.1f}%\"></span></span>"
-        "<span class=\"value\"><b>{} mm</b> {}</span></div>\n",
-        name, kind, 100 * value / most, figure(value), interval);
+  const auto bar = [](const char* kind, const char* name, double value, const json& from) {
+    return html::Bar{name, kind, value,
+                     with_interval(value, "mm", number(from, "rmse_low_mm"), number(from, "rmse_high_mm"))};
   };
-  std::string out = "<div class=\"bars\">\n" + bar("before", "before", *e.before, part(contract, "before")) +
-                    bar("after", "after", *e.after, part(contract, "after"));
-  if (e.floor) out += bar("floor", "noise floor", *e.floor, json());
-  return out + "</div>\n";
+  std::vector<html::Bar> all{bar("before", "before", *e.before, part(contract, "before")),
+                             bar("after", "after", *e.after, part(contract, "after"))};
+  if (e.floor) all.push_back(bar("floor", "noise floor", *e.floor, json()));
+  return html::bars(all, most);
 }
 
 std::string given_bars(const json& bars) {
   double most = 0;
+  std::vector<html::Bar> all;
   for (const json& bar : bars) {
-    const double from = number(bar, "from").value_or(0);
-    most = std::max({most, number(bar, "value").value_or(0) - from, number(bar, "high").value_or(0) - from});
-  }
-  if (most <= 0) return "";
-  std::string out;
-  for (const json& bar : bars) {
+    const double from = number(bar, "from").value_or(0), value = number(bar, "value").value_or(0);
     const auto low = number(bar, "low"), high = number(bar, "high");
-    const double above = number(bar, "value").value_or(0) - number(bar, "from").value_or(0);
-    out += fmt::format(
-        "<div class=\"bar\"><span class=\"what\">{}</span><span class=\"track\"><span class=\"fill {}\" "
-        "style=\"width:{:.1f}%\"></span></span><span class=\"value\"><b>{} {}</b> {}</span></div>\n",
-        escaped(text(bar, "name")), escaped(text(bar, "kind")), std::max(100 * above / most, 0.0),
-        figure(number(bar, "value")), escaped(text(bar, "unit")),
-        low && high ? fmt::format("<small>{} to {} (95 %)</small>", figure(low), figure(high)) : "");
+    most = std::max({most, value - from, high.value_or(0) - from});
+    all.push_back({text(bar, "name"), text(bar, "kind"), value - from,
+                   with_interval(number(bar, "value"), text(bar, "unit"), low, high)});
   }
-  return "<div class=\"bars\">\n" + out + "</div>\n";
+  return html::bars(all, most);
 }
 
 }  // namespace kilotwin::identify::report

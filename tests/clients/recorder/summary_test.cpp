@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.hpp"
@@ -79,9 +80,30 @@ TEST(Summary, HasTheFieldsOfTheContract) {
   EXPECT_EQ(json.size(), 30u);
 }
 
+/// A failed run with trackers, a virtual environment, a pace, a monitor and observables.
+Summary rich_example() {
+  Summary s = example();
+  s.failure = "physics 0,0: killed";
+  s.failures = {{7, 1.5, "stack overflow at a.c:3"}};
+  s.robots = 2;
+  s.per_robot.add({.attempted = 5, .sent = 4, .received = 3, .collided = 2, .backed_off = 1});
+  s.per_robot.add({.attempted = 8, .sent = 8, .received = 8, .collided = 0, .backed_off = 0});
+  s.observables = {{"lit", 0.5}, {"heard", std::nan("")}};
+  s.paced = true;
+  s.lateness = {12, 0.25};
+  s.station = {100, 80, 20, 3, 1, 40, 0.5, 1, 2, {{"walk", ""}, {"fields", "slow"}}};
+  s.tracked = true;
+  s.tracking.joined = 2;
+  s.tracking.lost = 1;
+  s.tracking.effect_p50_s = 0.0625;
+  s.tracking.trackers = {{"camera", 50, 2, 1, 1, 0.5, 3, 0.125, 0.25, 0.5, 1}};
+  s.monitor = R"({"alarms":1})";
+  return s;
+}
+
 TEST(Summary, ReadsBackWhatWasWritten) {
   const Scratch scratch;
-  write_summary(example(), scratch / "a.json");
+  write_summary(rich_example(), scratch / "a.json");
   write_summary(read_summary(scratch / "a.json"), scratch / "b.json");
   EXPECT_EQ(content(scratch / "a.json"), content(scratch / "b.json"));
   EXPECT_EQ(read_summary(scratch / "a.json").state_hash, 0x00ab'cdef'0123'4567u);

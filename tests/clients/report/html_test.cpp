@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cctype>
+
 namespace kilotwin::html {
 namespace {
 
@@ -24,6 +26,21 @@ TEST(Html, APageHoldsTitleStyleAndBody) {
   EXPECT_NE(whole.find("<body>\n<p>body {{name}}</p>\n</body></html>"), std::string::npos)
       << "a body is no template";
   EXPECT_NE(whole.find("@media print"), std::string::npos);
+}
+
+TEST(Html, ColoursFollowTheScheme) {
+  std::string style = page("", "");
+  EXPECT_NE(style.find("@media screen and (prefers-color-scheme: dark)"), std::string::npos);
+  // Every colour is a variable: those of :root alone are stated.
+  for (std::size_t at = 0; (at = style.find(":root {", at)) != std::string::npos;)
+    style.erase(at, style.find('}', at) - at);
+  for (std::size_t at = 0; (at = style.find('#', at)) != std::string::npos; ++at)
+    EXPECT_EQ(std::isxdigit(static_cast<unsigned char>(style[at + 1])), 0) << style.substr(at, 40);
+}
+
+TEST(Html, PlotsTakeTheInkOfThePageAndPicturesKeepTheirGround) {
+  EXPECT_TRUE(image("<svg/>", "a plot").starts_with("<img class=\"plot\" alt=\"a plot\" src=\"data:"));
+  EXPECT_TRUE(image("<svg/>", "a picture", Ground::kOwn).starts_with("<img alt=\"a picture\" src=\"data:"));
 }
 
 TEST(Html, TemplatesEscapeText) {
