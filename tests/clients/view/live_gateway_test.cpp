@@ -1,6 +1,7 @@
 // `kilotwin view` beside live runs, as processes: a gateway that stands still changes nothing, and a run without a pace shows a bounded
 // number of states.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <csignal>
 #include <cstring>
@@ -11,6 +12,7 @@
 
 #include "clients/recorder/summary.hpp"
 #include "core/dds/dds.hpp"
+#include "tests/clients/view/recordings.hpp"
 #include "tests/clients/view/websocket_client.hpp"
 #include "tests/system/program.hpp"
 
@@ -122,6 +124,14 @@ TEST_F(LiveGateway, ShowsFloorsOfARunWhoseDirectoryItKnows) {
       60));
   run.signal(SIGINT);
   static_cast<void>(run.wait());
+}
+
+TEST(Gateway, OfARecordingGivesWayToTheRunThatMayStillGoOn) {
+  Scratch scratch;
+  test::write_circling(scratch / "r.ktrec", {});
+  const Process process({KILOTWIN_VIEW_PROGRAM, "view", scratch / "r.ktrec"}, scratch.path());
+  ASSERT_TRUE(process.says("kilotwin: open", 60));
+  EXPECT_EQ(getpriority(PRIO_PROCESS, static_cast<id_t>(process.id())), 10);
 }
 
 }  // namespace

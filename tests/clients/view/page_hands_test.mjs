@@ -170,6 +170,8 @@ async function movesAndHandOvers() {
   await eventually("the whole run's times", async () => (await text(page, "work-span")) === "whole run");
   assert.deepEqual(page.faults, []);
   await page.close();
+  // The page knows of the end before the launcher has written the summary.
+  await eventually("the launcher's end", () => served.text.includes("the page now shows the recording"));
   assert.equal(await served.stop(), 0);
   execFileSync(kilotwin, ["replay", directory, "--verify"], { stdio: "pipe" });
 }
@@ -268,6 +270,8 @@ async function hybridRun() {
   await press(page, "Stop the run for good");
   await phase(page, "recorded");
   await page.close();
+  // The page knows of the end before the launcher has written the summary.
+  await eventually("the launcher's end", () => served.text.includes("the page now shows the recording"));
   assert.equal(await served.stop(), 0);
 }
 
