@@ -65,23 +65,21 @@ TEST(TuneCommand, TheWorstOfSeveralModelsDecides) {
   // Robots drive straight on for 3 s: at 1 mm/s by one model, at 20 mm/s by the other. The worst is the slow one's displacement, and
   // the mean lies halfway between both.
   Scratch scratch;
-  write(scratch / "slow.txtpb", "motion { straight_speed_mm_s: 1 bias_sd_mm_s: 0 }\n");
-  write(scratch / "fast.txtpb", "motion { straight_speed_mm_s: 20 bias_sd_mm_s: 0 }\n");
+  fs::create_directory(scratch / "models");
+  write(scratch / "models/slow.txtpb", "motion { straight_speed_mm_s: 1 bias_sd_mm_s: 0 }\n");
+  write(scratch / "models/fast.txtpb", "motion { straight_speed_mm_s: 20 bias_sd_mm_s: 0 }\n");
   const auto value = [&](bool worst) {
-    Words more{"--duration",
-               "3",
-               "--robots",
-               "4",
-               "--behaviour",
-               source("behaviours/straight.c"),
-               "--vary",
-               "robots.layout.grid.pitch_mm=200..210",
-               "--maximise",
-               "displacement",
-               "--models",
-               scratch / "slow.txtpb",
-               scratch / "fast.txtpb"};
-    if (worst) more.push_back("--worst");
+    Words more{"--duration",  "3",
+               "--robots",    "4",
+               "--behaviour", source("behaviours/straight.c"),
+               "--vary",      "robots.layout.grid.pitch_mm=200..210",
+               "--maximise",  "displacement",
+               "--models"};
+    // Files one by one, or all of a directory.
+    if (worst)
+      more.insert(more.end(), {scratch / "models/slow.txtpb", scratch / "models/fast.txtpb", "--worst"});
+    else
+      more.push_back(scratch / "models");
     if (fs::exists(scratch / "tune")) fs::remove_all(scratch / "tune");
     return tuned(more, scratch, source("experiments/disperse.txtpb"), "152").at("value").at("mean").get<double>();
   };
