@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 
 namespace kilotwin::track {
 namespace {
@@ -21,6 +22,8 @@ constexpr double kLeastLight = 0.10;
 constexpr double kMixed = 0.5;
 /// Where even the weakest one has this share, the light is white.
 constexpr double kGrey = 0.7;
+/// The floor is looked at no farther from the centre than this, radii, and places so close to another robot's centre are no floor.
+constexpr double kFarthestFloor = 3.0, kCovered = 1.25;
 /// Light that rises across the border to another robot, to more than this multiple, is the other's. So many windows are looked at.
 constexpr double kSpill = 1.5;
 constexpr int kClimb = 8, kTries = 3;
@@ -48,7 +51,7 @@ Colour floor_around(const cv::Mat& picture, const Circle& disc, const std::vecto
   const double r = disc.radius_px;
   constexpr int kAngles = 72, kRadii = 3;
   for (int pass = 0; pass < 2 && seen[0].size() < kAngles / 4; ++pass) {
-    const double from = pass == 0 ? kFloorFrom : kFloorTo, to = pass == 0 ? kFloorTo : 3.0;
+    const double from = pass == 0 ? kFloorFrom : kFloorTo, to = pass == 0 ? kFloorTo : kFarthestFloor;
     for (int i = 0; i < kAngles * kRadii; ++i) {
       const double at = r * (from + (to - from) * (i % kRadii) / (kRadii - 1));
       const double angle = 2 * CV_PI * (i / kRadii) / kAngles;
@@ -56,7 +59,7 @@ Colour floor_around(const cv::Mat& picture, const Circle& disc, const std::vecto
       const int column = cvRound(x), row = cvRound(y);
       if (column < 0 || row < 0 || column >= picture.cols || row >= picture.rows) continue;
       if (std::any_of(others.begin(), others.end(),
-                      [&](const Circle& o) { return distance(x, y, o) < 1.25 * o.radius_px; }))
+                      [&](const Circle& o) { return distance(x, y, o) < kCovered * o.radius_px; }))
         continue;
       const Colour c = pixel(picture, row, column);
       for (std::size_t k = 0; k < 3; ++k) seen[k].push_back(c[k]);
@@ -273,7 +276,14 @@ std::uint8_t bits_of(Led led) {
   return 0;
 }
 
-LedReading read_led(const cv::Mat& picture, const Circle& disc, const std::vector<Circle>& others) {
+LedReading read_led(const cv::Mat& picture, const Circle& disc, const std::vector<Circle>& all_others) {
+  // Those further away cover no pixel that is looked at, and are nearest to none.
+  static_assert(kCovered <= kOuter && kOuter <= kFarthestFloor);
+  std::vector<Circle> others;
+  std::copy_if(all_others.begin(), all_others.end(), std::back_inserter(others), [&](const Circle& other) {
+    return distance(other.centre.x_px, other.centre.y_px, disc) <
+           kFarthestFloor * disc.radius_px + kOuter * other.radius_px;
+  });
   Light light = light_around(picture, disc, others);
   if (light.weight.empty()) return {};
   Spot spot = brightest(light, disc);

@@ -28,7 +28,8 @@ struct LedReading {
   std::optional<double> bearing_rad;
 };
 
-/// `picture`: blue, green, red, 8 bits. `others`: discs of robots nearby, whose LEDs are not this robot's. A picture of one
+/// `picture`: blue, green, red, 8 bits. `others`: discs of all other robots, whose LEDs are not this robot's; those
+/// farther away cost next to nothing. A picture of one
 /// channel has no colours: white or off.
 [[nodiscard]] LedReading read_led(const cv::Mat& picture, const Circle& disc, const std::vector<Circle>& others);
 

@@ -89,8 +89,7 @@ Sighting PictureTracker::sighting_of(const cv::Mat& picture, const std::vector<D
   const Detection& detection = found[index];
   std::vector<Circle> others;
   for (std::size_t i = 0; i < found.size(); ++i) {
-    if (i != index && distance(found[i].disc.centre, detection.disc.centre) < 4.5 * detection.disc.radius_px)
-      others.push_back(found[i].disc);
+    if (i != index) others.push_back(found[i].disc);
   }
   const LedReading led = read_led(picture, detection.disc, others);
   const FloorPoint at = floor_->floor(detection.disc.centre);

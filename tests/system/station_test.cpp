@@ -47,7 +47,7 @@ TEST(Station, PluginsGiveOneHashHoweverARunIsDivided) {
 /// An experiment whose plugin does `what` in its run() after two seconds.
 std::string with_plugin(const Scratch& scratch, const std::string& what, const std::string& more = "") {
   write(scratch.path() / "bad.cpp",
-        "#include <kilotwin_station.hpp>\n#include <cstdlib>\n#include <stdexcept>\n"
+        "#include <kilotwin_station.hpp>\n#include <cstdlib>\n#include <stdexcept>\n#include <unistd.h>\n"
         "struct Bad : KilobotExperiment {\n  void initialise(bool) override {}\n"
         "  void run() override { if (time > 2) { " +
             what + " } }\n};\nextern \"C\" KilobotExperiment* createExpt() { return new Bad; }\n");
@@ -83,6 +83,17 @@ TEST(Station, APluginThatFailsCostsThePluginAlone) {
     EXPECT_EQ(json_of(scratch / "local/summary.json").at("state_hash"),
               json_of(scratch / "federated/summary.json").at("state_hash"));
   }
+}
+
+/// A run at a pace cannot wait for a plugin that sleeps for as long as one that runs as fast as it can.
+TEST(Station, APluginThatSleepsDoesNotHoldUpAPacedRun) {
+  const Scratch scratch;
+  const Outcome outcome = kilotwin({"run", with_plugin(scratch, "sleep(1000);"), "--mode", "local", "--pace", "1",
+                                    "--duration", "3", "--out", scratch / "run"},
+                                   scratch);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("run: it did not return"), std::string::npos) << outcome.err;
+  EXPECT_LT(json_of(scratch / "run/summary.json").at("wall_s").get<double>(), 30) << "of 60 s without a pace";
 }
 
 TEST(Station, AFailureEndsTheRunWhereTheExperimentSaysSo) {
@@ -128,12 +139,15 @@ TEST(Station, IdentifiesRobotsWhoseNumbersItDoesNotKnow) {
 
 /// The robots begin with numbers that the station does not know.
 TEST(Station, AssignsUniqueNumbers) {
-  for (const char* base : {"2", "3"}) {
+  for (const auto& [base, camera] : {std::pair{"2", "station.log_every_s=10"},
+                                     {"3", "station.log_every_s=10"},
+                                     {"3", "station.camera.frame_rate_hz=10"}}) {
+    SCOPED_TRACE(std::string(base) + " " + camera);
     const Scratch scratch;
     run(procedure("assign_ids", {"--robots", "12", "--duration", "120", "--set",
                                  "station.environment.plugin.parameter[0].name=base", "--set",
                                  "station.environment.plugin.parameter[0].value=" + std::string(base), "--set",
-                                 "robots.first_uid=100"}),
+                                 "robots.first_uid=100", "--set", camera}),
         scratch, "run");
     const auto report = json_of(scratch.path() / "run" / "station-0.json");
     EXPECT_EQ(report.at("assigned"), 12) << report.dump();

@@ -110,6 +110,7 @@ std::uint64_t play(const Film& film, const Judge& judge) {
       scene.robots.push_back(view);
     }
     renderer.render(scene, static_cast<std::uint64_t>(frame), picture);
+    if (film.light) picture.convertTo(picture, -1, film.light(t));
     judge(t, robots, tracker.process(picture, t));
   }
   return tracker.follower().doubts();

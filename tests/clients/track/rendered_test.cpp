@@ -1,6 +1,7 @@
 // The whole tracker on rendered pictures of robots that drive: positions, headings and colours against the truth.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -85,6 +86,19 @@ TEST_P(Rendered, PosesAndColoursAreRight) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Films, Rendered, testing::Values(Film{12, 0.6, 3, 0.2, 0.7}, Film{20, 1, 4, 0.25, 0.8}));
+
+/// A cloud: the light falls by half within the fifth second.
+double cloud(double t_s) { return 1 - 0.5 * std::clamp(t_s - 4, 0.0, 1.0); }
+/// A lamp at the mains: the light of a picture is off by up to 10 %, seen at 30 frames a second.
+double lamp(double t_s) { return 1 + 0.1 * std::sin(2 * kPi * 101.3 * t_s); }
+
+Film lit_by(double (*light)(double)) {
+  Film film{12, 0.8, 3, 0.2, 0.7};
+  film.light = light;
+  return film;
+}
+
+INSTANTIATE_TEST_SUITE_P(ChangingLight, Rendered, testing::Values(lit_by(cloud), lit_by(lamp)));
 
 // A third of the LEDs are dark beside lit ones of neighbours that they touch: the neighbours' glow is not theirs.
 TEST(Crowd, RobotsThatTouchKeepTheirColours) {
