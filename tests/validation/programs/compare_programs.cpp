@@ -48,7 +48,7 @@ struct Row {
 constexpr int kMoreSeeds = static_cast<int>(kLeastRuns), kMostSeeds = 3 * kMoreSeeds;
 
 /// Programs of the repository that are known to differ: docs/explanation/validation.md says why.
-constexpr std::array kKnown{"counts_loops.c", "overflowing_sum.c", "waits_in_callback.c", "follow.c"};
+constexpr std::array kKnown{"overflowing_sum.c", "waits_in_callback.c", "follow.c"};
 
 bool is_known(const fs::path& program) {
   return std::find(kKnown.begin(), kKnown.end(), program.filename().string()) != kKnown.end();
