@@ -89,7 +89,8 @@ std::vector<Place> places_of_map(const Factor& factor) {
 std::vector<Place> places_of(const Basis& basis) {
   if (basis.factors.empty()) return {{json(), Situation{}}};
   const Factor& factor = basis.factors.front();
-  if (basis.factors.size() > 1 || factor.shape == Shape::kTravelling) return {};
+  // The one coefficient of a grid scales a map whose values are fixed: its error says nothing about them.
+  if (basis.factors.size() > 1 || factor.shape == Shape::kTravelling || factor.shape == Shape::kGrid) return {};
   if (!factor.of_two()) return places_of_curve(factor);
   return factor.axis.of == Covariate::kX && factor.and_axis.of == Covariate::kY ? places_of_map(factor)
                                                                                 : std::vector<Place>{};

@@ -1,6 +1,7 @@
 #include "clients/identify/document.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +12,7 @@
 #include "clients/identify/fit/residuals.hpp"
 #include "clients/identify/model/effect_records.hpp"
 #include "clients/identify/model/effect_text.hpp"
+#include "clients/identify/predict/final_check.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -100,11 +102,11 @@ std::string in_words(const std::string& covariate) {
 }
 
 /// Share of the reduction of the mean square error that is lost without a term.
-double share_removed(const Findings& f, const TermCheck& term) {
+double share_removed(const Findings& f, double without_mm) {
   const double before_mm = f.before.errors.rmse_mm(), after_mm = f.after.errors.rmse_mm(),
                gap = before_mm * before_mm - after_mm * after_mm;
   if (gap <= 0) return 0;
-  return std::clamp((term.rmse_without_mm * term.rmse_without_mm - after_mm * after_mm) / gap, 0.0, 1.0);
+  return std::clamp((without_mm * without_mm - after_mm * after_mm) / gap, 0.0, 1.0);
 }
 
 json effect_of(const Findings& f, std::size_t t) {
@@ -116,9 +118,8 @@ json effect_of(const Findings& f, std::size_t t) {
   const std::string size = size_in_words(written);
   std::vector<std::string> covariates;
   for (const std::string& covariate : reason.covariates) covariates.push_back(in_words(covariate));
-  const bool judged = !f.terms.empty();
-  const auto if_judged = [&](double value) { return judged ? json(value) : json(); };
-  const HeldOutGain gain = judged ? f.terms[t].gain : HeldOutGain{};
+  const bool judged = !f.rmse_without_mm.empty(), chosen = !f.check.gains.empty();
+  const HeldOutGain gain = chosen ? f.check.gains[t] : HeldOutGain{};
   return {
       {"name", term.name},
       {"covariates", reason.covariates},
@@ -130,16 +131,16 @@ json effect_of(const Findings& f, std::size_t t) {
          std::min(1.0, ScoreTest::kFamilyAlarm *
                            std::pow(10.0, std::max(-300.0, reason.finding.log10_p - reason.threshold_log10_p)))},
         {"log_likelihood_gain", reason.finding.evidence},
-        {"held_out_gain", if_judged(gain.nat)},
-        {"held_out_gain_se", if_judged(gain.nat_se)},
+        {"held_out_gain", chosen ? json(gain.nat) : json()},
+        {"held_out_gain_se", chosen ? json(gain.nat_se) : json()},
         {"degrees", reason.finding.degrees}}},
       {"parameters",
        {{"form", form_of(term)},
         {"columns", term.coefficients.size()},
         {"records", records},
         {"bands_95", bands_of(f.found.fit.model, t, f.uncertainty)}}},
-      {"rmse_without_mm", judged ? json(f.terms[t].rmse_without_mm) : json()},
-      {"share_removed", judged ? json(share_removed(f, f.terms[t])) : json()},
+      {"rmse_without_mm", judged ? json(f.rmse_without_mm[t]) : json()},
+      {"share_removed", judged ? json(share_removed(f, f.rmse_without_mm[t])) : json()},
       {"in_words", fmt::format("{} depends on {}{}{}", reason.acts_on, fmt::join(covariates, ", "),
                                size.empty() ? "" : ": ", size)}};
 }
@@ -165,7 +166,7 @@ json effects_of(const Findings& f) {
       effects.push_back(std::move(effect));
       continue;
     }
-    if (f.terms.empty()) continue;
+    if (f.rmse_without_mm.empty()) continue;
     if ((*known)["rmse_without_mm"] < effect["rmse_without_mm"])
       (*known)["rmse_without_mm"] = effect["rmse_without_mm"];
     json &evidence = (*known)["evidence"], &other = effect["evidence"];
@@ -303,6 +304,22 @@ json check_of(const FinalCheck& check) {
   return {{"path", path}, {"kept", check.kept}, {"dropped", check.dropped}};
 }
 
+/// What a reader must know about the errors and the search; empty: nothing.
+std::string caveats_of(const Findings& f) {
+  std::vector<std::string> sentences;
+  const double before_mm = f.before.errors.rmse_mm(), after_mm = f.after.errors.rmse_mm();
+  if (after_mm > before_mm * (1 + kSameError))
+    sentences.push_back(fmt::format(
+        "With effects the error on these data is larger than that of the base model ({:.2f} mm, {:.2f} mm): "
+        "they differ from the data of the fit.",
+        after_mm, before_mm));
+  if (f.check.chose_on_reported && !f.check.path.empty())
+    sentences.emplace_back(
+        "The same held-out track chose the model and gives its error, so that the error is too small.");
+  if (!f.found.limit.empty()) sentences.push_back(f.found.limit);
+  return fmt::format("{}", fmt::join(sentences, " "));
+}
+
 /// [row][column]; null where there are no data.
 json rows_of(const Eigen::MatrixXd& values) {
   json rows = json::array();
@@ -414,6 +431,8 @@ json contract_of(const Findings& f, const MeasuredSet& judged, double horizon_s)
                      std::abs(lag_s), lag_s > 0 ? "later" : "earlier")}};
   contract["numbering"] = numbering_of(f.numbering);
   contract["check"] = check_of(f.check);
+  if (const std::string caveats = caveats_of(f); !caveats.empty()) contract["check"]["in_words"] = caveats;
+  contract["search"] = {{"work", f.found.work}, {"limit", f.found.limit}};
   contract["unexplained"] = unexplained_of(f.unexplained);
   contract["next"] = next_step(f);
   contract["rejected"] = rejected_of(f.found);

@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "clients/identify/fit/numbering.hpp"
@@ -14,37 +15,35 @@
 
 namespace kilotwin::identify {
 
-/// The model without one term, refitted, on held-out data.
-struct TermCheck {
-  FitState without;
-  double rmse_without_mm;
-  HeldOutGain gain;  ///< of the model with the term over the one without
-};
-
 /// A model on the path of the search, on held-out data.
 struct CheckedModel {
   std::vector<std::string> effects;
   double rmse_mm;
 };
 
-/// The last check, on data that took no part in choosing (final_check.hpp).
+/// The last check (last_check.hpp).
 struct FinalCheck {
   std::vector<CheckedModel> path;    ///< base model first; empty if nothing is held out
-  std::size_t kept = 0;              ///< index of the model that is written
+  std::size_t kept = 0;              ///< index of the model from which terms were then taken out
+  std::vector<HeldOutGain> gains;    ///< by term of the model that is written, on the tracks that choose
+  bool chose_on_reported = false;    ///< no held-out track was left to choose alone
   std::vector<std::string> dropped;  ///< effects of the last model of the path that are not written
 };
 
 struct Findings {
+  Findings(FitState base_model, Search searched)
+      : base(std::move(base_model)), found(std::move(searched)), before{base.tracks, {}, {}}, after(before) {}
+
   FitState base;
   Search found;  ///< `fit` is the model that is written
-  HeldOut held_out;
+  HeldOut held_out = HeldOut::kNothing;
   Judged before, after;               ///< the base model and the written one, on held-out data
   std::optional<ErrorBounds> bounds;  ///< of their errors
   /// The same errors of robots that stayed away from walls and from each other over the horizon.
   PredictionErrors free_before, free_after;
   double expected_mm = 0;  ///< error that the written model expects of itself
   std::optional<Replicates> replicates;
-  std::vector<TermCheck> terms;  ///< by term; empty if nothing is held out
+  std::vector<double> rmse_without_mm;  ///< by term, on held-out data; empty if nothing is held out
   FinalCheck check;
   Unexplained unexplained;
   Numbering numbering;      ///< of the robots, by the base model

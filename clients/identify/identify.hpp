@@ -9,7 +9,9 @@
 ///                 ambiguous, faults, simulated (replay/simulation_check.hpp). All errors are of held-out data; if
 ///                 nothing is held out they are null
 ///     next        the most useful thing to do next, as one sentence
-///     check       {path [{effects [..], rmse_mm}], kept, dropped [..]}: the last check (predict/final_check.hpp)
+///     check       {path [{effects [..], rmse_mm}], kept, dropped [..], in_words}: the last check (last_check.hpp);
+///                 `in_words`: what a reader must know about the errors and the search, absent if nothing
+///     search      {work (fit/prepared_set.hpp), limit (a sentence, empty if the search ended by itself)}
 ///     unexplained {large, systematic_mm, share, expected_mm, repetitions_mm, learner {error_mm, error_left_mm,
 ///                 less_by_low_mm, less_by_high_mm, cross_validated}, patterns [{covariates [..], units [..], components
 ///                 [..], share, at [..], and_at [..], first_mm [and_at][at], second_mm}], in_words}: what the model

@@ -58,12 +58,21 @@ identify::Identified identify_trajectories(const IdentifyArguments& arguments, c
     test = identify::load_or_import(arguments.test, out / "imported-test");
     identify::demand_plausible(*test, arguments.test.string());
     identify::demand_longer_than(*test, arguments.horizon_s, false, arguments.test.string());
+    identify::hold_out_for_choice(train);
   } else {
     identify::hold_out_part(train);
     const bool held_out = std::any_of(train.runs.begin(), train.runs.end(), [](const identify::Run& run) {
       return std::any_of(run.tracks.begin(), run.tracks.end(), [](const identify::Track& t) { return t.held_out; });
     });
     identify::demand_longer_than(train, arguments.horizon_s, held_out, arguments.train.string());
+  }
+  if (test) {
+    // Faults of the test data are excluded from nothing: each row is predicted.
+    identify::MeasuredSet copy = *test;
+    for (identify::DataFault& fault : identify::exclude_faults(copy)) {
+      fault.of_test = true;
+      faults.push_back(std::move(fault));
+    }
   }
   identify::Identified found = identify::identify(train, test ? &*test : nullptr, options);
   found.document["contract"]["faults"] = identify::document_of(faults);
@@ -114,7 +123,7 @@ void print_errors(const nlohmann::json& result, double horizon_s) {
         "away from walls and other robots ({:.0f} % of the predictions): {:.2f} mm, {:.2f} mm with effects\n",
         100 * free->at("share_of_rows").get<double>(), free->at("before_mm").get<double>(),
         free->at("after_mm").get<double>());
-  for (const char* of : {"command_lag", "numbering"}) {
+  for (const char* of : {"command_lag", "numbering", "check"}) {
     const auto found = result.find(of);
     if (found != result.end() && found->contains("in_words"))
       fmt::print("{}\n", found->at("in_words").get<std::string>());
@@ -125,8 +134,8 @@ void print_errors(const nlohmann::json& result, double horizon_s) {
       fmt::print("{}: not written, because held-out data are predicted no better with it\n",
                  name.get<std::string>());
   }
-  if (is_unexplained(result))
-    fmt::print("unexplained: {}\n", result.at("unexplained").at("in_words").get<std::string>());
+  if (const auto left = result.find("unexplained"); left != result.end())
+    fmt::print("{}{}\n", is_unexplained(result) ? "unexplained: " : "", left->at("in_words").get<std::string>());
 }
 
 void print_results(const IdentifyArguments& arguments, const identify::Identified& found,
@@ -140,8 +149,11 @@ void print_results(const IdentifyArguments& arguments, const identify::Identifie
   for (const identify::DataFault& fault : faults) fmt::print("{}: {}\n", name_of(fault.kind), fault.in_words());
   for (const auto& effect : result.at("effects"))
     fmt::print("{}: {}\n", effect.at("name").get<std::string>(), effect.at("in_words").get<std::string>());
-  if (result.at("effects").empty() && !is_unexplained(result))
-    fmt::print("no significant effect: the base model explains these data\n");
+  if (result.at("effects").empty() && !is_unexplained(result)) {
+    const bool dropped = result.contains("check") && !result.at("check").at("dropped").empty();
+    fmt::print("{}\n", dropped ? "no effect is written: the base model predicts held-out data as well"
+                               : "no significant effect: no tested effect improves on the base model");
+  }
   if (const auto next = result.find("next"); next != result.end())
     fmt::print("next: {}\n", next->get<std::string>());
 }

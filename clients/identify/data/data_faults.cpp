@@ -286,31 +286,33 @@ const char* name_of(DataFault::Kind kind) {
 
 std::string DataFault::in_words() const {
   const std::string who = robot ? fmt::format("robot {}", *robot) : "several robots";
+  const std::string where = fmt::format("{}un {}", of_test ? "Test data, r" : "R", run);
+  const auto consequence = [&](const std::string& excluded_ones) {
+    return of_test ? std::string("The error on the test data contains it.") : excluded_ones;
+  };
+  const std::string positions = fmt::format("{} positions excluded.", excluded);
   switch (kind) {
     case Kind::kOutliers:
-      return fmt::format(
-          "Run {}: {} outlier{} of {}, up to {:.0f} mm away from where {} before and after. Excluded.", run,
-          excluded, excluded == 1 ? "" : "s", who, strength, robot ? "it was" : "they were");
+      return fmt::format("{}: {} outlier{} of {}, up to {:.0f} mm away from where {} before and after. {}", where,
+                         excluded, excluded == 1 ? "" : "s", who, strength, robot ? "it was" : "they were",
+                         consequence("Excluded."));
     case Kind::kFrozen:
       return fmt::format(
-          "Run {}: the position of {} is frozen from {:.1f} to {:.1f} s, to the last digit, while it was commanded "
-          "to move. {} positions excluded.",
-          run, who, from_s, to_s, excluded);
+          "{}: the position of {} is frozen from {:.1f} to {:.1f} s, to the last digit, while it was commanded "
+          "to move. {}",
+          where, who, from_s, to_s, consequence(positions));
     case Kind::kDuplicate:
-      return fmt::format(
-          "Run {}: robot {} is a second track of robot {}, at {:.1f} mm (discs are 33 mm wide). Its {} "
-          "positions excluded.",
-          run, *robot, *other, strength, excluded);
+      return fmt::format("{}: robot {} is a second track of robot {}, at {:.1f} mm (discs are 33 mm wide). {}",
+                         where, *robot, *other, strength, consequence("Its " + positions));
     case Kind::kSwapped:
       return fmt::format(
-          "Run {}: the numbers of robots {} and {} are swapped from {:.1f} to {:.1f} s: exchanging their commands "
-          "raises the log-likelihood by {:.0f}. {} positions excluded.",
-          run, *robot, *other, from_s, to_s, strength, excluded);
+          "{}: the numbers of robots {} and {} are swapped from {:.1f} to {:.1f} s: exchanging their commands "
+          "raises the log-likelihood by {:.0f}. {}",
+          where, *robot, *other, from_s, to_s, strength, consequence(positions));
     case Kind::kClock:
       return fmt::format(
-          "Run {}: the tracker's clock is wrong: robots follow their commands if its times are divided by {:.4f}. "
-          "The run's {} positions are excluded.",
-          run, strength, excluded);
+          "{}: the tracker's clock is wrong: robots follow their commands if its times are divided by {:.4f}. {}",
+          where, strength, consequence(fmt::format("The run's {} positions are excluded.", excluded)));
   }
   return {};
 }
@@ -322,6 +324,7 @@ nlohmann::json document_of(const std::vector<DataFault>& faults) {
   };
   for (const DataFault& f : faults) {
     all.push_back({{"kind", name_of(f.kind)},
+                   {"set", f.of_test ? "test" : "train"},
                    {"run", f.run},
                    {"robot", number(f.robot)},
                    {"other", number(f.other)},

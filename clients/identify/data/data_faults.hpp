@@ -28,6 +28,8 @@ struct DataFault {
   double strength =
       0;  ///< outliers: largest distance, mm; clock: stamped over true time; swapped: gain in log-likelihood
   std::size_t excluded = 0;  ///< number of samples excluded
+  /// Of a test set: nothing of it is excluded, and its error contains the fault.
+  bool of_test = false;
 
   /// One sentence: the evidence, and what was excluded.
   [[nodiscard]] std::string in_words() const;
@@ -42,7 +44,7 @@ struct DataFault {
 /// without one (tests/identify).
 std::vector<DataFault> exclude_faults(MeasuredSet&);
 
-/// [{kind, run, robot, other, from_s, to_s, strength, excluded, in_words}]; robot and other may be null.
+/// [{kind, set ("train" or "test"), run, robot, other, from_s, to_s, strength, excluded, in_words}]; robot and other may be null.
 [[nodiscard]] nlohmann::json document_of(const std::vector<DataFault>&);
 
 // The steps of exclude_faults, in its order. Each appends the faults it finds and excludes their samples.

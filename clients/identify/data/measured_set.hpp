@@ -32,7 +32,22 @@ struct Track {
   std::vector<CommandChange> commands;
   /// Excluded from the fit. Neighbours still see the robot.
   bool held_out = false;
+  /// Held out, and chooses among the models of the search. The other held-out tracks give the reported error.
+  bool chooses = false;
 };
+
+/// The tracks of a set that count for something.
+enum class Tracks : std::uint8_t { kAll, kFit, kHeldOut, kChoosing, kReporting };
+[[nodiscard]] constexpr bool counts(const Track& track, Tracks which) {
+  switch (which) {
+    case Tracks::kAll: return true;
+    case Tracks::kFit: return !track.held_out;
+    case Tracks::kHeldOut: return track.held_out;
+    case Tracks::kChoosing: return track.held_out && track.chooses;
+    case Tracks::kReporting: return track.held_out && !track.chooses;
+  }
+  return false;
+}
 
 struct Run {
   std::string name;

@@ -13,6 +13,8 @@
 namespace kilotwin::identify {
 namespace {
 
+// As core/experiment/limits.hpp. A model with a robot beyond it would be refused.
+constexpr std::uint32_t kMostRobots = 100'000;
 // Longest plausible run: eleven days.
 constexpr double kLongestRun_s = 1e6;
 constexpr double kSlowestSampling_s = 60;
@@ -29,6 +31,17 @@ constexpr double kLeastSeen = 0.05, kMuchTime_s = 2e5;
 
 std::string of(const Run& run, const Track& track) {
   return fmt::format("run {}, robot {}", run.name, track.robot);
+}
+
+void demand_robot_numbers(const MeasuredSet& set, const std::string& from) {
+  for (const Run& run : set.runs) {
+    for (const Track& track : run.tracks) {
+      if (track.robot < kMostRobots) continue;
+      throw UserError(
+          fmt::format("{}: {}: the simulator takes robot numbers below {}; give the robots smaller numbers", from,
+                      of(run, track), kMostRobots));
+    }
+  }
 }
 
 void demand_seconds(const MeasuredSet& set, const std::string& from) {
@@ -160,6 +173,7 @@ void demand_motion(const MeasuredSet& set, const std::string& from) {
 }  // namespace
 
 void demand_plausible(const MeasuredSet& set, const std::string& from) {
+  demand_robot_numbers(set, from);
   demand_seconds(set, from);
   demand_one_recording_per_run(set, from);
   demand_millimetres(set, from);

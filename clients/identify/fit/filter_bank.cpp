@@ -56,10 +56,13 @@ void FilterBank::start(const Sample& sample) {
 
 void FilterBank::prune() {
   constexpr double kHopeless = 20;
+  // A weight that is no finite number is as good as none. If no weight is finite, all hypotheses stay, with equal weights.
   double best = -1e300;
-  for (const Hypothesis& h : hypotheses_) best = std::max(best, h.log_weight);
-  for (Hypothesis& h : hypotheses_) h.log_weight -= best;
-  std::erase_if(hypotheses_, [](const Hypothesis& h) { return h.log_weight < -kHopeless; });
+  for (const Hypothesis& h : hypotheses_)
+    if (std::isfinite(h.log_weight)) best = std::max(best, h.log_weight);
+  const bool any = best > -1e300;
+  for (Hypothesis& h : hypotheses_) h.log_weight = any ? h.log_weight - best : 0;
+  std::erase_if(hypotheses_, [](const Hypothesis& h) { return !(h.log_weight >= -kHopeless); });
   // Merges hypotheses that have converged to the same heading.
   for (std::size_t i = 0; i + 1 < hypotheses_.size(); ++i) {
     for (std::size_t j = i + 1; j < hypotheses_.size();) {

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <cstdint>
 
 #include "clients/identify/fit/track_filter.hpp"
 #include "clients/identify/model/neighbours.hpp"
@@ -42,6 +44,7 @@ struct TrackView {
   const CommandClock* clock = nullptr;
   const std::vector<bool>* at_boundary = nullptr;  ///< whether each sample is at the boundary of visited places
   double start_heading_rad = 0, start_heading_sd_rad = 0;  ///< at the first sample, as last estimated
+  std::atomic<std::uint64_t>* work = nullptr;              ///< counts work; null: nobody counts
 
   /// The part of a situation that does not depend on the pose.
   [[nodiscard]] Situation at(double time_s) const {
@@ -61,13 +64,16 @@ void run_filter(TrackFilter& filter, const TrackView& view, std::size_t samples,
   const std::vector<Sample>& all = view.track->samples;
   filter.start(all.front(), {}, view.start_heading_rad, view.start_heading_sd_rad);
   visitor.start(filter);
+  std::uint64_t steps = 0;
   for (std::size_t i = 1; i < std::min(samples, all.size()); ++i) {
     filter.at_boundary((*view.at_boundary)[i - 1] || (*view.at_boundary)[i]);
     sub_steps(*view.clock, all[i - 1].time_s, all[i].time_s, [&](double t, double h, const CommandState& commands) {
       visitor.step(filter.step(t, h, commands, view.neighbours->view(view.place, t + h / 2)));
+      ++steps;
     });
     visitor.update(filter.update(all[i], view.clock->at(all[i].time_s - 1e-9)), all[i]);
   }
+  if (view.work != nullptr) *view.work += steps;
 }
 
 }  // namespace kilotwin::identify

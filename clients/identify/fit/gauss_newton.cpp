@@ -10,6 +10,9 @@
 namespace kilotwin::identify {
 namespace {
 
+/// Largest speed of a wheel that the simulator takes, mm/s.
+constexpr double kFastest_mm_s = 200;
+
 /// The normal equations of a step: data, prior of the base parameters, prior of the terms.
 struct Equations {
   std::vector<Unit> units;
@@ -65,8 +68,10 @@ void Fitter::add_base_prior(const MotionModel& model, Eigen::MatrixXd& informati
 
 void Fitter::apply(MotionModel& model, const std::vector<Unit>& units, const Eigen::VectorXd& step) {
   const auto limited = [](double value, double most) { return std::clamp(value, -most, most); };
-  model.base.straight_mm_s += limited(step[kStraightSpeed], 20);
-  model.base.turn_mm_s += limited(step[kTurnSpeed], 20);
+  // Robots that seem to drive backwards, as under wrong headings, are no slower than robots at rest.
+  const auto speed = [](double mm_s) { return std::clamp(mm_s, 0.0, kFastest_mm_s); };
+  model.base.straight_mm_s = speed(model.base.straight_mm_s + limited(step[kStraightSpeed], 20));
+  model.base.turn_mm_s = speed(model.base.turn_mm_s + limited(step[kTurnSpeed], 20));
   model.base.wheel_base_mm = std::clamp(model.base.wheel_base_mm + limited(step[kWheelBase], 3), 10.0, 60.0);
   model.base.ahead_mm += limited(step[kAheadPoint], 8);
   model.base.left_mm += limited(step[kLeftPoint], 8);

@@ -36,6 +36,7 @@ class Sensitivities {
     for (const Block& block : blocks) measures_ = measures_ || is_measured(block.target);
   }
 
+  [[nodiscard]] Eigen::Index columns() const { return columns_; }
   void begin_track(const TrackView& view) {
     run_ = view.run;
     cluster_start_s_ = -1e300;
@@ -304,6 +305,15 @@ class Sensitivities {
   double of_left_[kMostColumns], of_right_[kMostColumns];
 };
 
+/// Columns cost in proportion, their products by the square: one sub-step of the filter is the unit.
+void count_work(const TrackView& view, Eigen::Index columns) {
+  constexpr double kByColumn = 0.1, kByProduct = 1.0 / 3000;
+  const auto n = static_cast<double>(columns);
+  if (view.work != nullptr)
+    *view.work += static_cast<std::uint64_t>(static_cast<double>(view.track->samples.size()) *
+                                             (kByColumn * n + kByProduct * n * n));
+}
+
 }  // namespace
 
 std::vector<Unit> linearise(const MotionModel& model, const std::vector<std::vector<const TrackView*>>& units,
@@ -321,6 +331,7 @@ std::vector<Unit> linearise(const MotionModel& model, const std::vector<std::vec
       sums.begin_track(*view);
       run_filter(filter, *view, view->track->samples.size(), sums);
       sums.flush();
+      count_work(*view, sums.columns());
     }
     const double sd = model.base.bias_sd_mm_s;
     sums.finish(out[u], Eigen::Vector2d::Constant(model.base.bias_mean_mm_s) - bias.mean_mm_s, 1 / (sd * sd));

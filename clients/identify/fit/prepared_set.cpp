@@ -23,7 +23,9 @@ PreparedSet::PreparedSet(const MeasuredSet& set, std::uint32_t first_number)
       const Track& track = set.runs[r].tracks[t];
       if (track.samples.size() < 2) continue;
       const auto place = static_cast<std::uint32_t>(r);
-      views_.push_back({&track, place, first_number + place, t, neighbours.get()});
+      TrackView view{&track, place, first_number + place, t, neighbours.get()};
+      view.work = work_.get();
+      views_.push_back(view);
       clocks->emplace_back(track);
     }
     neighbours_.push_back(std::move(neighbours));

@@ -49,6 +49,10 @@ class PreparedSet {
   /// Robots that came near each other, by disc centres.
   [[nodiscard]] std::vector<RobotPair> pairs() const;
 
+  /// Work done on these tracks and all copies of them: sub-steps of filters, each times its columns if it is linearised.
+  /// It depends on the data alone, not on the machine.
+  [[nodiscard]] std::uint64_t work() const { return *work_; }
+
   /// Lets robots follow their commands this much later than stamped, s.
   void set_command_lag(double lag_s);
   /// Estimates the disc centres, and with them what neighbours see.
@@ -70,6 +74,7 @@ class PreparedSet {
   /// By run; what they point to is constant.
   std::vector<std::shared_ptr<const RunNeighbours>> neighbours_;
   std::vector<TrackView> views_;
+  std::shared_ptr<std::atomic<std::uint64_t>> work_ = std::make_shared<std::atomic<std::uint64_t>>(0);
 };
 
 }  // namespace kilotwin::identify

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 #include <google/protobuf/text_format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "clients/identify/model/effect_records.hpp"
@@ -34,7 +36,9 @@ proto::Model proto_of(const MotionModel& fitted) {
   motion.set_straight_speed_mm_s(rounded(fitted.base.straight_mm_s));
   motion.set_turn_speed_mm_s(rounded(fitted.base.turn_mm_s));
   motion.set_wheel_base_mm(rounded(fitted.base.wheel_base_mm));
-  motion.set_axle_offset_mm(rounded(fitted.base.centre_mm));
+  // The simulator takes no disc centre outside of the body.
+  const double centre_mm = std::clamp(fitted.base.centre_mm, -kDiscDiameter_mm / 2, kDiscDiameter_mm / 2);
+  motion.set_axle_offset_mm(rounded(centre_mm));
   motion.set_bias_mean_mm_s(rounded(fitted.base.bias_mean_mm_s));
   motion.set_bias_sd_mm_s(rounded(fitted.base.bias_sd_mm_s));
   motion.set_factor_variance_s(rounded(fitted.noise.factor_s));
@@ -45,7 +49,7 @@ proto::Model proto_of(const MotionModel& fitted) {
     own.set_bias_left_mm_s(rounded(bias.mean_mm_s[0]));
     own.set_bias_right_mm_s(rounded(bias.mean_mm_s[1]));
   }
-  const double ahead = fitted.base.ahead_mm - fitted.base.centre_mm;
+  const double ahead = fitted.base.ahead_mm - centre_mm;
   const double off = std::hypot(ahead, fitted.base.left_mm);
   if (off > 1e-3) {
     proto::Effect& point = add_effect(model, "tracked-point", proto::Effect::MEASURED_BODY_OFFSET);
@@ -66,13 +70,18 @@ proto::Model proto_of(const MotionModel& fitted) {
     if (fitted.cells[c].forget_s > 0) field.set_forget_s(rounded(fitted.cells[c].forget_s));
   }
   std::set<std::string> names;
+  std::map<std::string, int> terms_named;
   for (const Term& term : fitted.terms) {
+    const int number = ++terms_named[term.name];
     for (const proto::Effect& effect : effects_of_term(term)) {
       std::string name = effect.name();
       for (int again = 2; !names.insert(name).second; ++again)
         name = fmt::format("{}-again{}", effect.name(), again);
-      *model.add_effect() = effect;
-      model.mutable_effect(model.effect_size() - 1)->set_name(name);
+      proto::Effect& written = *model.add_effect();
+      written = effect;
+      written.set_name(name);
+      // Gains of different terms multiply, also those of one name.
+      if (number > 1 && effect.has_sum()) written.set_sum(fmt::format("{}-again{}", effect.sum(), number));
     }
   }
   return model;

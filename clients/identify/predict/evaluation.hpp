@@ -21,8 +21,12 @@ enum class HeldOut : std::uint8_t { kTestSet, kRuns, kRobots, kNothing, kNoTime 
 [[nodiscard]] std::string in_words(HeldOut);
 
 /// Holds out about a quarter: the last runs if there are three or more, else some robots, else the last run. One run of
-/// up to three robots is fitted whole.
+/// up to three robots is fitted whole. Every other held-out robot (or run, or track) chooses among the models of the search,
+/// the others give the reported error. A single held-out track does not choose.
 void hold_out_part(MeasuredSet&);
+/// Beside a test set: holds out one track in five, which chooses. With two runs or more each robot keeps tracks in the fit.
+/// Less than five tracks are fitted whole.
+void hold_out_for_choice(MeasuredSet&);
 
 /// The held-out tracks as one model sees them, and its forecasts of them.
 struct Judged {
@@ -33,14 +37,14 @@ struct Judged {
 
 class Evaluation {
  public:
-  /// `test`: null if a part of `train` is held out, or nothing. Both must outlive the evaluation.
-  Evaluation(const MeasuredSet& train, const MeasuredSet* test, std::uint32_t threads);
+  /// On all tracks of `test` or, without it, on those tracks `of` the training set. Both sets must outlive the evaluation.
+  Evaluation(const MeasuredSet& train, const MeasuredSet* test, Tracks of, std::uint32_t threads);
 
   [[nodiscard]] HeldOut held_out() const { return held_out_; }
   /// The set with the held-out tracks.
   [[nodiscard]] const MeasuredSet& set() const { return test_ != nullptr ? *test_ : train_; }
-  /// Whether only tracks with the mark `held_out` of the set count.
-  [[nodiscard]] bool marked_only() const { return held_out_ == HeldOut::kRuns || held_out_ == HeldOut::kRobots; }
+  /// The tracks of the set that count.
+  [[nodiscard]] Tracks of() const { return of_; }
   /// The tracks of the set as this model sees them: disc centres and initial headings are its own.
   [[nodiscard]] PreparedSet tracks_of(const FitState&) const;
   /// Forecasts of the held-out tracks.
@@ -50,6 +54,7 @@ class Evaluation {
   const MeasuredSet& train_;
   const MeasuredSet* test_;
   std::optional<PreparedSet> test_tracks_;  ///< as measured
+  Tracks of_;
   std::uint32_t threads_;
   HeldOut held_out_;
 };

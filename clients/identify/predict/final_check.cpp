@@ -1,28 +1,20 @@
 #include "clients/identify/predict/final_check.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace kilotwin::identify {
-namespace {
 
-/// Relative rise of the error that counts as none: effects of the measurement hardly change predictions.
-constexpr double kSame = 1e-3;
-
-bool worse_beyond_bounds(const MeasuredSet& set, const PredictionErrors& smaller, const PredictionErrors& larger) {
-  if (larger.rmse_mm() <= smaller.rmse_mm() * (1 + kSame)) return false;
-  const std::optional<ErrorBounds> bounds = bounds_of(set, smaller, larger);
-  return !bounds || bounds->less_by.high_mm < 0;
-}
-
-}  // namespace
-
-std::size_t last_not_worse(const MeasuredSet& set, const std::vector<PredictionErrors>& path) {
-  for (std::size_t k = path.size(); k-- > 1;) {
-    // Negated, so that an error that is no number does not pass.
-    if (!(path[k].rmse_mm() <= path.front().rmse_mm() * (1 + kSame))) continue;
-    bool worse = false;
-    for (std::size_t j = 0; j < k && !worse; ++j) worse = worse_beyond_bounds(set, path[j], path[k]);
-    if (!worse) return k;
+std::size_t smallest_of_the_best(const std::vector<Candidate>& path) {
+  double least_mm = INFINITY;
+  for (const Candidate& c : path)
+    if (c.rmse_mm < least_mm) least_mm = c.rmse_mm;
+  std::size_t chosen = path.size();
+  for (std::size_t k = 0; k < path.size(); ++k) {
+    if (!(path[k].rmse_mm <= least_mm * (1 + kSameError))) continue;
+    if (chosen == path.size() || path[k].size <= path[chosen].size) chosen = k;
   }
-  return 0;
+  return chosen == path.size() ? 0 : chosen;
 }
 
 }  // namespace kilotwin::identify

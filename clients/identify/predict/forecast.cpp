@@ -337,7 +337,7 @@ struct RunForecast {
 }  // namespace
 
 std::vector<Forecast> forecast(const MotionModel& model, const PreparedSet& set,
-                               const ForecastTimes& forecast_times, bool held_out_only, std::uint32_t threads) {
+                               const ForecastTimes& forecast_times, Tracks of, std::uint32_t threads) {
   const std::vector<Run>& runs = set.set().runs;
   std::vector<std::vector<Forecast>> by_run(runs.size());
   const bool effects_of_neighbours = looks_at_neighbours(model),
@@ -349,8 +349,8 @@ std::vector<Forecast> forecast(const MotionModel& model, const PreparedSet& set,
     bool wanted = false;
     for (const TrackView& view : set.views()) {
       if (view.run != run) continue;
-      if (held_out_only && !view.track->held_out && !neighbours) continue;
-      wanted = wanted || !held_out_only || view.track->held_out;
+      if (!counts(*view.track, of) && !neighbours) continue;
+      wanted = wanted || counts(*view.track, of);
       views.push_back(&view);
       last_s = std::max(last_s, end_of(view.track->samples));
     }
@@ -385,8 +385,7 @@ std::vector<Forecast> forecast(const MotionModel& model, const PreparedSet& set,
         }
       }
       for (std::size_t i = 0; i < seen.size(); ++i)
-        if (!std::isnan(seen[i].x_mm) && (!held_out_only || views[i]->track->held_out))
-          by_run[run].push_back(seen[i]);
+        if (!std::isnan(seen[i].x_mm) && counts(*views[i]->track, of)) by_run[run].push_back(seen[i]);
     }
   });
   std::vector<Forecast> all;

@@ -24,10 +24,9 @@ struct ForecastTimes {
 };
 
 /// Forecasts for the times first_s, first_s + every_s, ... up to the last sample of each track. Each uses
-/// measurements up to one horizon before, and commands after. `held_out_only`: held-out tracks only. All robots of
-/// a run advance together, so that neighbour effects act within the horizon.
+/// measurements up to one horizon before, and commands after. `of`: the tracks to predict. All robots of a run advance together, so that neighbour effects act within the horizon.
 [[nodiscard]] std::vector<Forecast> forecast(const MotionModel&, const PreparedSet&, const ForecastTimes&,
-                                             bool held_out_only, std::uint32_t threads);
+                                             Tracks of, std::uint32_t threads);
 
 /// The forecasts of robots that stayed away from walls and from other robots over the whole horizon, by measured places.
 [[nodiscard]] std::vector<Forecast> free_ones(const MotionModel&, const PreparedSet&, const std::vector<Forecast>&,

@@ -27,14 +27,14 @@ std::vector<double> log_likelihoods(const MotionModel& model, PreparedSet set, s
 
 }  // namespace
 
-HeldOutGain held_out_gain(const MotionModel& with, const MotionModel& without, const PreparedSet& set,
-                          bool held_out_only, std::uint32_t threads) {
+HeldOutGain held_out_gain(const MotionModel& with, const MotionModel& without, const PreparedSet& set, Tracks of,
+                          std::uint32_t threads) {
   const std::vector<double> less = log_likelihoods(without, set, threads),
                             more = log_likelihoods(with, set, threads);
   std::map<std::uint32_t, double> by_robot;
   for (std::size_t v = 0; v < more.size(); ++v) {
     const Track& track = *set.views()[v].track;
-    if (!held_out_only || track.held_out) by_robot[track.robot] += more[v] - less[v];
+    if (counts(track, of)) by_robot[track.robot] += more[v] - less[v];
   }
   HeldOutGain gain;
   for (const auto& [robot, nat] : by_robot) gain.nat += nat;

@@ -142,7 +142,7 @@ std::string words_of(const json& statistics, bool decidable, const char* unit) {
 
 }  // namespace
 
-json simulation_check(const WrittenModel& base, const WrittenModel& full, PreparedSet set, bool held_out_only,
+json simulation_check(const WrittenModel& base, const WrittenModel& full, PreparedSet set, Tracks which,
                       std::uint32_t threads) {
   set.find_headings(full.fitted, threads);
   const std::size_t runs = set.set().runs.size();
@@ -154,7 +154,7 @@ json simulation_check(const WrittenModel& base, const WrittenModel& full, Prepar
     Played p{scene_of(base.fitted, set, run), scene_of(full.fitted, set, run), {}};
     for (std::size_t r = 0; r < p.full.robots.size(); ++r) {
       const Track* const track = p.full.robots[r].track;
-      if (held_out_only && !track->held_out) continue;
+      if (!counts(*track, which)) continue;
       p.compared.push_back(r);
       tracks.push_back(track);
       robots.push_back(track->robot);

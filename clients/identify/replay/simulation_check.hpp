@@ -15,13 +15,13 @@ struct WrittenModel {
   const proto::Model& written;
 };
 
-/// Compares the tracks of `set` (with `held_out_only`: its held-out tracks) with simulations of both models.
+/// Compares the tracks of `set` that count (`which`) with simulations of both models.
 /// Estimates initial headings first. Returns
 ///   simulated      {engine, seeds, robots, runs, unit, statistics [{name, unit, distance, by_chance_95, p, agrees,
 ///                  base_distance, base_p}], agrees, in_words}; `agrees` is null with too few robots
 ///   distributions, msd, speed_over_time   plot data (identify.hpp)
 /// Empty if the runs are too long to simulate or yield no statistic.
 [[nodiscard]] nlohmann::json simulation_check(const WrittenModel& base, const WrittenModel& full, PreparedSet set,
-                                              bool held_out_only, std::uint32_t threads);
+                                              Tracks which, std::uint32_t threads);
 
 }  // namespace kilotwin::identify

@@ -53,7 +53,7 @@ std::string headline(const json& contract) {
   if (phrases.empty() && !tracker)
     return part(part(contract, "unexplained"), "large") == json(true)
                ? "No tested effect explains how these data deviate from the base model"
-               : "The base model explains these data";
+               : "No tested effect improves on the base model";
   if (phrases.empty()) return fmt::format("The base model explains the motion, but {}", kSeen);
   std::string because = phrases[0];
   if (phrases.size() == 2) because += " and " + phrases[1];
@@ -72,7 +72,9 @@ std::string verdict(const json& contract) {
       ahead, figure(e.before));
   const std::size_t count = part(contract, "effects").is_array() ? part(contract, "effects").size() : 0;
   if (count == 0) {
-    out += ". No tested effect is significant.";
+    const json& not_written = part(part(contract, "check"), "dropped");
+    out += not_written.is_array() && !not_written.empty() ? ". No effect is written."
+                                                          : ". No tested effect is significant.";
     if (e.floor && e.before && *e.before > 1.15 * *e.floor)
       out += " The error above the noise floor depends on no tested covariate.";
   } else {
@@ -90,7 +92,7 @@ std::string verdict(const json& contract) {
         "before and "
         "<b>{} mm</b> after.",
         percent(share), figure(number(free, "before_mm")), figure(number(free, "after_mm")));
-  for (const char* of : {"command_lag", "numbering"})
+  for (const char* of : {"command_lag", "numbering", "check"})
     if (const std::string words = text(part(contract, of), "in_words"); !words.empty()) out += " " + escaped(words);
   if (const json& dropped = part(part(contract, "check"), "dropped"); dropped.is_array() && !dropped.empty())
     out += fmt::format(" {} not written: held-out data are predicted no better with {}.",
@@ -123,11 +125,15 @@ std::string verdict(const json& contract) {
   const json& faults = part(contract, "faults");
   if (const auto share = share_explained(e); share && count > 0)
     out += fmt::format(" The model removes {} of the explainable mean square error.", percent(share));
-  if (faults.is_array() && !faults.empty()) {
-    out += fmt::format(" The data have <a href=\"#faults\">{}</a>, which {} excluded from the fit.",
-                       faults.size() == 1 ? "a fault" : fmt::format("{} faults", faults.size()),
-                       faults.size() == 1 ? "was" : "were");
-  }
+  const auto of_test =
+      std::count_if(faults.begin(), faults.end(), [](const json& fault) { return text(fault, "set") == "test"; });
+  const auto of_train = (faults.is_array() ? static_cast<std::ptrdiff_t>(faults.size()) : 0) - of_test;
+  const auto in_words = [](std::ptrdiff_t n) {
+    return fmt::format("<a href=\"#faults\">{}</a>, which {}", n == 1 ? "a fault" : fmt::format("{} faults", n),
+                       n == 1 ? "is" : "are");
+  };
+  if (of_train > 0) out += fmt::format(" The data have {} excluded from the fit.", in_words(of_train));
+  if (of_test > 0) out += fmt::format(" The test data have {} part of the error.", in_words(of_test));
   if (const std::string next = text(contract, "next"); !next.empty()) out += " <b>Next:</b> " + escaped(next);
   return out;
 }

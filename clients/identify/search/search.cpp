@@ -1,5 +1,7 @@
 #include "clients/identify/search/search.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -20,7 +22,10 @@
 namespace kilotwin::identify {
 namespace {
 
-constexpr int kMostRounds = 7;
+/// Limits of a search: accepted changes without general terms, hypotheses that failed after their refit, and work
+/// (PreparedSet::work). A set of 24 robots, 3 runs and 300 s stays far below the last one.
+constexpr int kMostRounds = 7, kMostFailed = 20;
+constexpr std::uint64_t kMostWork = 40'000'000'000;
 /// Hypotheses with more alternatives (as a logarithm) than this, single steps and pulses, are no alternatives in
 /// an exchange.
 constexpr double kManyChoices = 2.5;
@@ -40,6 +45,8 @@ constexpr std::size_t kEnoughSamples = 130000;
 /// The same for general terms, which have more columns.
 constexpr std::size_t kEnoughForGeneral = 70000;
 constexpr int kMostGeneral = 3;
+/// General terms that are tried in one round.
+constexpr std::size_t kMostTries = 4;
 /// Key of a general term among the failed hypotheses.
 constexpr const char* kGeneral = "general ";
 
@@ -51,61 +58,85 @@ class Loop {
         progress_(progress),
         leaves_much_(leaves_much),
         extent_(extent_of(base.tracks)),
-        out_{base, {}, {{base, {}}}, {}, {}, {}} {
+        out_{base, {}, {{base, {}}}, {}, {}, {}, {}} {
     base_likelihood_ = fitter.log_likelihood_of_all(base);
   }
 
   Search run() {
-    for (int round = 0; round < kMostRounds + 2 * general_terms_; ++round) {
-      round_ = round;
-      say("testing hypotheses", 0);
-      if (accept_calibration_shifts()) {
-        note_stage();
-        continue;
-      }
-      score_dictionary();
-      const ScoreTest::Outcome outcome = score_test_->test(kSeed + static_cast<std::uint64_t>(round));
-      note_rejected(outcome);
-      const Finding* const best = best_of(outcome, kRemnant * explained());
-      if (best != nullptr && lag_explains(*best)) {
-        note_stage();
-        continue;
-      }
-      if (best != nullptr) {
-        const Search before = out_;
-        const double likelihood = fitter_.log_likelihood_of_all(out_.fit);
-        note_ambiguous(*best, outcome);
-        if (replaced_by_alternative(hypothesis(*best).name)) {
-          note_stage();
-          continue;
-        }
-        note_alternatives(*best, outcome);
-        add(*best, outcome.threshold_log10_p);
-        // The likelihood must rise by a part of the predicted gain.
-        if (fitter_.log_likelihood_of_all(out_.fit) < likelihood + 3) {
-          out_ = before;
-          failed_.insert(hypothesis(*best).name);
-        } else {
-          say("backward elimination", 0.6);
-          eliminate_earlier();
-          fitter_.fit_contacts(out_.fit);
-          try_camera_motion();
-          note_stage();
-        }
-        continue;
-      }
-      say("testing alternatives", 0.5);
-      if (!eliminate() && !accept_general()) break;
+    while (changed()) {
+      ++round_;
       note_stage();
     }
     for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t) {
       say("simplifying shapes", static_cast<double>(t) / static_cast<double>(out_.fit.model.terms.size()));
       simplify(fitter_, out_.fit, t);
     }
+    out_.work = out_.fit.tracks.work();
     return std::move(out_);
   }
 
  private:
+  /// Makes one change of the model: an addition, or at a limit and when nothing passes a removal or an exchange. Returns false
+  /// if there is none.
+  bool changed() {
+    say("testing hypotheses", 0);
+    if (limit().empty() && accept_calibration_shifts()) return true;
+    score_dictionary();
+    const ScoreTest::Outcome outcome = score_test_->test(kSeed + static_cast<std::uint64_t>(round_));
+    note_rejected(outcome);
+    // A hypothesis that fails leaves the state as it was, so that the outcome of the tests remains valid.
+    while (const Finding* const best = best_of(outcome, kRemnant * explained())) {
+      out_.limit = limit();
+      if (!out_.limit.empty()) break;
+      if (lag_explains(*best) || accepted(*best, outcome)) return true;
+    }
+    say("testing alternatives", 0.5);
+    return eliminate() || accept_general();
+  }
+  /// The limit that the search has reached, in one sentence; empty: none. It then adds nothing more.
+  [[nodiscard]] std::string limit() const {
+    if (worked_out()) return "The search ended at its limit of work; further effects may be in these data.";
+    if (failures_ >= kMostFailed)
+      return fmt::format(
+          "The search ended after {} hypotheses that passed the tests but did not fit; further effects may be in "
+          "these data.",
+          failures_);
+    if (round_ >= kMostRounds + 2 * general_terms_)
+      return fmt::format(
+          "The search ended at its limit of {} changes of the model, with a further effect significant.", round_);
+    return {};
+  }
+  [[nodiscard]] bool worked_out() const { return out_.fit.tracks.work() >= kMostWork; }
+  /// Adds a hypothesis that passed. Returns false, with the state as before, if the likelihood does not rise by a part of the
+  /// predicted gain.
+  bool accepted(const Finding& best, const ScoreTest::Outcome& outcome) {
+    constexpr double kLeastRise = 3;
+    const Search before = out_;
+    const std::string name = hypothesis(best).name;
+    const double likelihood = fitter_.log_likelihood_of_all(out_.fit);
+    note_ambiguous(best, outcome);
+    if (replaced_by_alternative(name)) return true;
+    note_alternatives(best, outcome);
+    add(best, outcome.threshold_log10_p);
+    // Negated, so that a likelihood that is no number fails.
+    if (!(fitter_.log_likelihood_of_all(out_.fit) >= likelihood + kLeastRise)) {
+      out_ = before;
+      failed_.insert(name);
+      ++failures_;
+      return false;
+    }
+    say("backward elimination", 0.6);
+    eliminate_earlier();
+    fitter_.fit_contacts(out_.fit);
+    try_camera_motion();
+    refit_lag();
+    return true;
+  }
+  /// A lag that was fitted before a term may have been off: refits it, and takes out what it explains then.
+  void refit_lag() {
+    if (out_.fit.model.base.command_lag_s == 0 || fitter_.fit_command_lag(out_.fit) == 0) return;
+    for (std::size_t t = out_.fit.model.terms.size(); t-- > 0;) removed(t, false);
+  }
   void note_stage() { out_.path.push_back({out_.fit, out_.reasons}); }
   /// `part`: the share of the present round that is done.
   void say(const char* doing, double part) const {
@@ -173,20 +204,19 @@ class Loop {
   /// Gain in log likelihood of all accepted effects.
   [[nodiscard]] double explained() const { return fitter_.log_likelihood_of_all(out_.fit) - base_likelihood_; }
 
-  /// Adds the general term with the most evidence if much is left unexplained. Returns whether there is one.
-  bool accept_general() {
-    if (general_terms_ == kMostGeneral || !leaves_much_ || !leaves_much_(out_.fit)) return false;
-    say("testing general terms", 0.7);
+  /// A general term that passed, with its reason.
+  struct GeneralTerm {
+    Term term;
+    Reason reason;
+  };
+  /// Those that pass the tests, of each name the one with the most evidence, in the order of their evidence.
+  std::vector<GeneralTerm> general_candidates() {
     if (general_.empty()) general_ = general_dictionaries_of(extent_);
     std::vector<Dictionary> families = general_;
     if (Dictionary waves = wave_dictionary_of(fitter_, out_.fit, extent_); !waves.hypotheses.empty())
       families.push_back(std::move(waves));
-    struct Best {
-      Term term;
-      Reason reason;
-    };
-    std::optional<Best> best;
-    bool is_wave = false;  // a form of its own, with a name
+    std::map<std::string, GeneralTerm> best;
+    const double least = kRemnant * explained();
     for (const Dictionary& family : families) {
       std::vector<Block> blocks = blocks_of(out_.fit.model);
       blocks.insert(blocks.end(), family.blocks.begin(), family.blocks.end());
@@ -194,35 +224,56 @@ class Loop {
           linearise(out_.fit.model, tested_units(kEnoughForGeneral), blocks, {100, fitter_.threads()});
       const ScoreTest test(fitter_, out_.fit.model, units, family);
       const ScoreTest::Outcome outcome = test.test(kSeed + 100 + static_cast<std::uint64_t>(round_));
+      // Waves have a form of their own, with a name.
+      const bool waves = &family == &families.back() && families.size() > general_.size();
       for (const Finding& f : outcome.findings) {
         const Hypothesis& h = family.hypotheses[f.hypothesis];
-        if (!good(f, outcome.threshold_log10_p) || f.evidence < kRemnant * explained() ||
-            failed_.contains(kGeneral + h.name) || (best && f.evidence <= best->reason.finding.evidence))
+        const auto known = best.find(h.name);
+        if (!good(f, outcome.threshold_log10_p) || f.evidence < least || failed_.contains(kGeneral + h.name) ||
+            (known != best.end() && f.evidence <= known->second.reason.finding.evidence))
           continue;
-        is_wave = &family == &families.back() && families.size() > general_.size();
-        best = Best{family.term_of(h, f.relative_scale), {h.covariates, h.acts_on, f, outcome.threshold_log10_p}};
+        GeneralTerm one{family.term_of(h, f.relative_scale),
+                        {h.covariates, h.acts_on, f, outcome.threshold_log10_p}};
+        one.term.general = !waves;
+        best.insert_or_assign(h.name, std::move(one));
       }
     }
-    if (!best) return false;
+    std::vector<GeneralTerm> ranked;
+    for (auto& [name, one] : best) ranked.push_back(std::move(one));
+    std::stable_sort(ranked.begin(), ranked.end(), [](const GeneralTerm& a, const GeneralTerm& b) {
+      return a.reason.finding.evidence > b.reason.finding.evidence;
+    });
+    if (ranked.size() > kMostTries) ranked.resize(kMostTries);
+    return ranked;
+  }
+  /// Adds the general term with the most evidence that fits, if much is left unexplained. Returns whether there is one.
+  bool accept_general() {
+    constexpr double kLeastRise = 3;
+    if (general_terms_ == kMostGeneral || !limit().empty() || !leaves_much_ || !leaves_much_(out_.fit))
+      return false;
+    say("testing general terms", 0.7);
     const Search before = out_;
     const double likelihood = fitter_.log_likelihood_of_all(out_.fit);
-    const std::string name = best->term.name;
-    best->term.general = !is_wave;
-    out_.fit.model.terms.push_back(std::move(best->term));
-    out_.reasons.push_back(std::move(best->reason));
-    say("fitting", 0.3);
-    fitter_.fit(out_.fit, 2);
-    refine_shape(out_.fit.model.terms.size() - 1);
-    fitter_.fit_contacts(out_.fit);
-    out_.steps.push_back({name, out_.reasons.back().finding.held_out});
-    if (fitter_.log_likelihood_of_all(out_.fit) < likelihood + 3) {
+    for (GeneralTerm& one : general_candidates()) {
+      if (worked_out()) break;
+      const std::string name = one.term.name;
+      out_.fit.model.terms.push_back(std::move(one.term));
+      out_.reasons.push_back(std::move(one.reason));
+      say("fitting", 0.3);
+      fitter_.fit(out_.fit, 2);
+      refine_shape(out_.fit.model.terms.size() - 1);
+      fitter_.fit_contacts(out_.fit);
+      out_.steps.push_back({name, out_.reasons.back().finding.held_out});
+      if (fitter_.log_likelihood_of_all(out_.fit) >= likelihood + kLeastRise) {
+        ++general_terms_;
+        --eliminations_;
+        return true;
+      }
       out_ = before;
       failed_.insert(kGeneral + name);
-      return accept_general();
     }
-    ++general_terms_;
-    --eliminations_;
-    return true;
+    if (worked_out()) out_.limit = limit();
+    return false;
   }
   /// Whether a lag between commands and motion, one number, explains most of what the best hypothesis explains. Then
   /// the model gets the lag.
@@ -234,7 +285,7 @@ class Loop {
     FitState anew = out_.path.front().fit;
     if (fitter_.fit_command_lag(anew) == 0) return true;
     starts_anew_ = true;
-    out_ = {std::move(anew), {}, {out_.path.front()}, {}, {}, {}};
+    out_ = {std::move(anew), {}, {out_.path.front()}, {}, {}, {}, {}};
     failed_.clear();
     return true;
   }
@@ -363,7 +414,7 @@ class Loop {
   /// continue.
   bool eliminate() {
     if (eliminations_++ >= 3) return false;
-    for (int t = 0; t < static_cast<int>(out_.fit.model.terms.size()); ++t) {
+    for (int t = 0; t < static_cast<int>(out_.fit.model.terms.size()) && !worked_out(); ++t) {
       const auto place = static_cast<std::size_t>(t);
       const Finding own = score_test_->evidence_of_term(t);
       if (own.held_out < 2 && removed(place, false)) return true;
@@ -531,7 +582,7 @@ class Loop {
   };
   Alternatives alternatives_;
   std::set<std::string> failed_;  ///< hypotheses that failed after the refit
-  int eliminations_ = 0, round_ = 0;
+  int eliminations_ = 0, round_ = 0, failures_ = 0;
   bool starts_anew_ = false;  ///< with a lag
 };
 

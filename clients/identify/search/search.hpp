@@ -2,6 +2,7 @@
 /// highest evidence, refit; when nothing is significant, test every accepted effect against its alternatives.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -52,6 +53,8 @@ struct Search {
   std::vector<Ambiguity> ambiguous;
   std::vector<Rejected> rejected;  ///< the most significant hypotheses that are not in the model
   std::vector<Step> steps;
+  std::string limit;  ///< one sentence if the search ended at one of its limits; empty: nothing passed any more
+  std::uint64_t work = 0;  ///< PreparedSet::work at its end
 };
 
 /// Starts from a fitted base model. `progress` gets 0..1 and the present step. `leaves_much`: whether a model leaves a

@@ -30,14 +30,14 @@ class Classes {
 };
 
 /// Half the sum of squares that a speed per class explains.
-double explained(const std::vector<std::vector<Instant>>& runs, const GridCells& cells) {
+double explained(const Visits& visits, const GridCells& cells) {
   static const Classes classes;
   std::array<double, Classes::kCount> score{}, information{};
-  for (const std::vector<Instant>& run : runs) {
+  for (const std::vector<Instant>& run : visits.runs) {
     TrafficGrid traffic(cells);
-    double now_s = -RunNeighbours::kRaster_s;
+    double now_s = -visits.every_s;
     for (const Instant& instant : run) {
-      now_s += RunNeighbours::kRaster_s;
+      now_s += visits.every_s;
       for (const Visit& v : instant) {
         if (v.information == 0) continue;
         const std::size_t c = classes.of(traffic.value_s(v.x_mm, v.y_mm, now_s));
@@ -45,7 +45,7 @@ double explained(const std::vector<std::vector<Instant>>& runs, const GridCells&
         information[c] += v.information;
       }
       for (const Visit& v : instant)
-        if (v.driven) traffic.add(v.x_mm, v.y_mm, RunNeighbours::kRaster_s, now_s);
+        if (v.driven) traffic.add(v.x_mm, v.y_mm, visits.every_s, now_s);
     }
   }
   double sum = 0;
@@ -60,7 +60,7 @@ struct RatedCells {
 };
 
 /// Coordinate ascent with decreasing steps.
-RatedCells climbed(const std::vector<std::vector<Instant>>& runs, RatedCells best, double extent_mm) {
+RatedCells climbed(const Visits& visits, RatedCells best, double extent_mm) {
   constexpr double kFinest = 0.004;  // relative to the cell side
   for (double step = 0.16; step > kFinest; step /= 2) {
     for (bool better = true; better;) {
@@ -78,7 +78,7 @@ RatedCells climbed(const std::vector<std::vector<Instant>>& runs, RatedCells bes
           RatedCells trial;
           trial.cells = {best.cells.side_mm + sign * by_side, best.cells.x_mm + sign * by_x,
                          best.cells.y_mm + sign * by_y, best.cells.forget_s + sign * by_forget};
-          trial.value = explained(runs, trial.cells);
+          trial.value = explained(visits, trial.cells);
           if (trial.value <= best.value) continue;
           best = trial;
           better = true;
@@ -96,9 +96,9 @@ RatedCells climbed(const std::vector<std::vector<Instant>>& runs, RatedCells bes
 }  // namespace
 
 GridCells fit_grid_cells(const Fitter& fitter, const FitState& state, const GridCells& from, std::uint8_t during) {
-  const std::vector<std::vector<Instant>> runs = visits_of(fitter, state, during);
+  const Visits visits = visits_of(fitter, state, during);
   std::vector<float> away;
-  for (const auto& run : runs)
+  for (const auto& run : visits.runs)
     for (const Instant& instant : run)
       for (const Visit& v : instant) away.push_back(std::max(std::abs(v.x_mm), std::abs(v.y_mm)));
   if (away.empty()) return from;
@@ -115,12 +115,13 @@ GridCells fit_grid_cells(const Fitter& fitter, const FitState& state, const Grid
       for (int j = 0; j < kCorners; ++j)
         all.push_back({{side, side * i / kCorners, side * j / kCorners, from.forget_s}, 0});
   os::in_parallel(all.size(), fitter.threads(),
-                  [&](std::size_t i) { all[i].value = explained(runs, all[i].cells); });
+                  [&](std::size_t i) { all[i].value = explained(visits, all[i].cells); });
   std::stable_sort(all.begin(), all.end(),
                    [](const RatedCells& a, const RatedCells& b) { return a.value > b.value; });
   constexpr std::size_t kClimbed = 6;
   all.resize(std::min(all.size(), kClimbed));
-  os::in_parallel(all.size(), fitter.threads(), [&](std::size_t i) { all[i] = climbed(runs, all[i], extent_mm); });
+  os::in_parallel(all.size(), fitter.threads(),
+                  [&](std::size_t i) { all[i] = climbed(visits, all[i], extent_mm); });
   return std::max_element(all.begin(), all.end(),
                           [](const RatedCells& a, const RatedCells& b) { return a.value < b.value; })
       ->cells;

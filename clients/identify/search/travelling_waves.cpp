@@ -16,8 +16,11 @@ namespace {
 constexpr double kShortest_mm = 120, kShortest_s = 12, kSpacing = 0.5;
 /// Peaks that become hypotheses.
 constexpr std::size_t kPeaks = 4;
-/// Visits that the periodogram uses.
+/// Visits that the periodogram uses, and its largest number of wave numbers x frequencies x visits.
 constexpr std::size_t kMostVisits = 25000;
+constexpr double kMostTerms = 3e9;
+/// Steps of the ascent from one peak. It settles after some tens.
+constexpr int kMostSteps = 300;
 
 struct Point {
   double x_mm, y_mm, time_s, score, information;
@@ -27,15 +30,15 @@ struct Point {
 using Wave = std::array<double, 3>;
 
 std::vector<Point> points_of(const Fitter& fitter, const FitState& state) {
-  const std::vector<std::vector<Instant>> runs = visits_of(fitter, state, kDriven);
+  const Visits visits = visits_of(fitter, state, kDriven);
   std::vector<Point> all;
-  for (std::size_t r = 0; r < runs.size(); ++r) {
+  for (std::size_t r = 0; r < visits.runs.size(); ++r) {
     const double start_s = state.tracks.neighbours(r).instants() > 0 ? state.tracks.neighbours(r).time_s(0) : 0;
-    for (std::size_t i = 0; i < runs[r].size(); ++i)
-      for (const Visit& v : runs[r][i])
+    for (std::size_t i = 0; i < visits.runs[r].size(); ++i)
+      for (const Visit& v : visits.runs[r][i])
         if (v.information > 0)
-          all.push_back({v.x_mm, v.y_mm, start_s + static_cast<double>(i) * RunNeighbours::kRaster_s, v.score,
-                         v.information});
+          all.push_back(
+              {v.x_mm, v.y_mm, start_s + static_cast<double>(i) * visits.every_s, v.score, v.information});
   }
   const std::size_t every = all.size() / kMostVisits + 1;
   std::vector<Point> some;
@@ -90,8 +93,9 @@ Peak best_frequency(const std::vector<Point>& points, double kx, double ky, doub
 
 Peak climbed(const std::vector<Point>& points, Peak peak, const Wave& step) {
   peak.power = power_of(points, peak.wave);
+  int steps = 0;
   for (double part = 0.5; part > 0.02; part /= 2) {
-    for (bool better = true; better;) {
+    for (bool better = true; better && steps < kMostSteps; ++steps) {
       better = false;
       for (std::size_t d = 0; d < 3; ++d) {
         for (const double sign : {1.0, -1.0}) {
@@ -108,6 +112,25 @@ Peak climbed(const std::vector<Point>& points, Peak peak, const Wave& step) {
   return peak;
 }
 
+/// Spacing of the wave numbers and frequencies, and how many there are to each side of 0.
+struct Raster {
+  Wave step;
+  int across, up, steps;
+};
+
+/// Where the raster would be too large, as in a large room or a long run, the shortest wavelength and period rise together.
+Raster raster_of(double width_mm, double height_mm, double duration_s, std::size_t points) {
+  const Wave step{kSpacing * 2 * M_PI / std::max(width_mm, 1.0), kSpacing * 2 * M_PI / std::max(height_mm, 1.0),
+                  kSpacing * 2 * M_PI / duration_s};
+  for (double longer = 1;; longer *= 1.1) {
+    const double across = std::floor(2 * M_PI / (longer * kShortest_mm) / step[0]),
+                 up = std::floor(2 * M_PI / (longer * kShortest_mm) / step[1]),
+                 steps = std::floor(2 * M_PI / (longer * kShortest_s) / step[2]);
+    if ((2 * across + 1) * (up + 1) * (2 * steps + 1) * static_cast<double>(points) <= kMostTerms)
+      return {step, static_cast<int>(across), static_cast<int>(up), static_cast<int>(steps)};
+  }
+}
+
 }  // namespace
 
 Dictionary wave_dictionary_of(const Fitter& fitter, const FitState& state, const Extent& extent) {
@@ -117,11 +140,7 @@ Dictionary wave_dictionary_of(const Fitter& fitter, const FitState& state, const
   const double width_mm = extent.x_high_mm - extent.x_low_mm, height_mm = extent.y_high_mm - extent.y_low_mm;
   constexpr std::size_t kFewest = 500;
   if (points.size() >= kFewest && extent.duration_s > 2 * kShortest_s) {
-    const Wave step{kSpacing * 2 * M_PI / width_mm, kSpacing * 2 * M_PI / height_mm,
-                    kSpacing * 2 * M_PI / extent.duration_s};
-    const double most = 2 * M_PI / kShortest_mm;
-    const int across = static_cast<int>(most / step[0]), up = static_cast<int>(most / step[1]);
-    const int steps = static_cast<int>(2 * M_PI / kShortest_s / step[2]);
+    const auto [step, across, up, steps] = raster_of(width_mm, height_mm, extent.duration_s, points.size());
     // Opposite wave numbers with the opposite frequency are the same wave.
     std::vector<std::pair<double, double>> numbers;
     for (int j = 0; j <= up; ++j)

@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "clients/identify/fit/contact_gate.hpp"
 #include "core/os/worker_pool.hpp"
@@ -57,7 +58,7 @@ class SpeedResiduals {
 
 }  // namespace
 
-std::vector<std::vector<Instant>> visits_of(const Fitter& fitter, const FitState& state, std::uint8_t during) {
+Visits visits_of(const Fitter& fitter, const FitState& state, std::uint8_t during) {
   const MotionModel& model = state.model;
   const PreparedSet& set = state.tracks;
   const std::vector<TrackView>& views = set.views();
@@ -73,15 +74,21 @@ std::vector<std::vector<Instant>> visits_of(const Fitter& fitter, const FitState
     // Removes the mean of each robot.
     double score = 0, information = 0;
     for (const Residual& r : residuals[v]) score += r.score, information += r.information;
-    for (Residual& r : residuals[v]) r.score -= r.information * score / information;
+    if (information > 0)
+      for (Residual& r : residuals[v]) r.score -= r.information * score / information;
   });
   constexpr std::size_t kMost = 150000;
+  const auto tracks_of = [&](std::size_t r) { return set.set().runs[r].tracks.size(); };
   std::vector<std::vector<Instant>> runs(set.set().runs.size());
+  std::size_t all = 0;
+  for (std::size_t r = 0; r < runs.size(); ++r)
+    if (tracks_of(r) > 0) all += set.neighbours(r).instants() * tracks_of(r);
+  const std::size_t every = all / kMost + 1;
   for (std::size_t r = 0; r < runs.size(); ++r) {
     const RunNeighbours& near = set.neighbours(r);
-    const std::size_t tracks = set.set().runs[r].tracks.size();
+    const std::size_t tracks = tracks_of(r);
     if (tracks == 0) continue;
-    runs[r].resize(std::min(near.instants(), kMost / runs.size() / tracks));
+    runs[r].resize((near.instants() + every - 1) / every);
     // [track][instant].
     std::vector<std::vector<std::pair<float, float>>> known(tracks);
     for (std::size_t v = 0; v < views.size(); ++v) {
@@ -91,17 +98,19 @@ std::vector<std::vector<Instant>> visits_of(const Fitter& fitter, const FitState
       for (const Residual& residual : residuals[v]) {
         const auto at = [&](double time_s) {
           const double i = std::ceil((time_s - near.time_s(0)) / RunNeighbours::kRaster_s - 1e-6);
-          return static_cast<std::size_t>(std::clamp(i, 0.0, static_cast<double>(own.size())));
+          return static_cast<std::size_t>(std::clamp(i, 0.0, static_cast<double>(near.instants())));
         };
         const std::size_t first = at(residual.from_s), last = at(residual.to_s);
         const auto share = 1.0F / static_cast<float>(std::max<std::size_t>(last - first, 1));
-        for (std::size_t i = first; i < last; ++i)
-          own[i] = {share * static_cast<float>(residual.score), share * static_cast<float>(residual.information)};
+        for (std::size_t i = first; i < last; ++i) {
+          own[i / every].first += share * static_cast<float>(residual.score);
+          own[i / every].second += share * static_cast<float>(residual.information);
+        }
       }
     }
     for (std::size_t i = 0; i < runs[r].size(); ++i) {
       for (std::size_t t = 0; t < tracks; ++t) {
-        const RunNeighbours::Spot& s = near.spot(t, i);
+        const RunNeighbours::Spot& s = near.spot(t, i * every);
         if (std::isnan(s.x_mm)) continue;
         const auto [score, information] = known[t].empty() ? std::pair{0.0F, 0.0F} : known[t][i];
         runs[r][i].push_back(
@@ -109,7 +118,7 @@ std::vector<std::vector<Instant>> visits_of(const Fitter& fitter, const FitState
       }
     }
   }
-  return runs;
+  return {std::move(runs), static_cast<double>(every) * RunNeighbours::kRaster_s};
 }
 
 }  // namespace kilotwin::identify

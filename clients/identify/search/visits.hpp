@@ -15,8 +15,13 @@ struct Visit {
 };
 using Instant = std::vector<Visit>;
 
-/// By run, then by instant of the raster of RunNeighbours, from its start on. Long sets: the beginning of every run. `during`:
-/// commands whose residuals count, as in Block.
-[[nodiscard]] std::vector<std::vector<Instant>> visits_of(const Fitter&, const FitState&, std::uint8_t during);
+struct Visits {
+  std::vector<std::vector<Instant>>
+      runs;        ///< by run, then by instant, from the start of the raster of RunNeighbours on
+  double every_s;  ///< between instants: that raster, or a multiple of it in long sets
+};
+
+/// `during`: commands whose residuals count, as in Block.
+[[nodiscard]] Visits visits_of(const Fitter&, const FitState&, std::uint8_t during);
 
 }  // namespace kilotwin::identify

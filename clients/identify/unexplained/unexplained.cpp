@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "clients/identify/unexplained/random_forest.hpp"
 
@@ -63,7 +65,7 @@ std::vector<Window> part_of(const std::vector<Window>& all, std::size_t folds, s
 /// Whether errors ahead and to the left are easier to learn than those along x and y: half of the tracks from the rest.
 bool body_is_better(const std::vector<Window>& known) {
   const std::vector<Window> first = part_of(known, 2, 0, true), second = part_of(known, 2, 0, false);
-  if (first.empty() || second.empty()) return true;
+  if (std::min(first.size(), second.size()) < kFewestKnown / 2) return true;
   return left_of(first, second, true).squaredNorm() < left_of(first, second, false).squaredNorm();
 }
 
@@ -134,14 +136,49 @@ std::string words_of(const Pattern& p) {
   return text;
 }
 
-std::string words_of(const Unexplained& u, const std::string& evidence) {
-  if (!u.large()) {
-    if (!u.learner) return "Too few predictions to look for unexplained errors.";
-    return fmt::format(
-        "Nothing large is left unexplained: the error is within what the model expects, and a random forest over "
-        "all "
-        "covariates predicts no part of it.");
+/// How the error compares with what the model expects of itself, where no gap is beyond its uncertainty.
+std::string comparison_in_words(const Unexplained& u, const std::optional<ErrorBounds>& bounds) {
+  if (u.error_mm == 0) return "Nothing is held out, so that the error is not compared with what the model expects.";
+  if (!bounds)
+    return "There is one held-out track only, so that the error is not compared with what the model expects.";
+  if (u.expected_mm > 0 && u.error_mm <= kBeyond * u.expected_mm)
+    return fmt::format("The error of {:.2f} mm is within what the model expects ({:.2f} mm).", u.error_mm,
+                       u.expected_mm);
+  return fmt::format(
+      "The error of {:.2f} mm exceeds the {:.2f} mm that the model expects, but too few data are held out to be "
+      "sure: "
+      "it is {:.2f} to {:.2f} mm (95 %).",
+      u.error_mm, u.expected_mm, bounds->after.low_mm, bounds->after.high_mm);
+}
+
+/// A robot whose error is several times that of the others, in one sentence; empty: none.
+std::string odd_robot_in_words(const MeasuredSet& set, const PredictionErrors& errors) {
+  constexpr double kOdd = 3;
+  constexpr std::size_t kFewestRobots = 4;
+  std::map<std::uint32_t, PredictionErrors::Part> robots;
+  for (const auto& [at, part] : errors.by_track) {
+    PredictionErrors::Part& sum = robots[set.runs[at.first].tracks[at.second].robot];
+    sum.sum_mm2 += part.sum_mm2;
+    sum.rows += part.rows;
   }
+  if (robots.size() < kFewestRobots) return {};
+  std::vector<std::pair<double, std::uint32_t>> by_error;
+  for (const auto& [robot, part] : robots)
+    if (part.rows > 0) by_error.emplace_back(std::sqrt(part.sum_mm2 / static_cast<double>(part.rows)), robot);
+  if (by_error.empty()) return {};
+  std::sort(by_error.begin(), by_error.end());
+  const double median_mm = by_error[by_error.size() / 2].first;
+  const auto& [largest_mm, robot] = by_error.back();
+  if (!(largest_mm > kOdd * median_mm)) return {};
+  return fmt::format(" Robot {} has an error of {:.2f} mm, {:.1f} times the median of the robots.", robot,
+                     largest_mm, largest_mm / median_mm);
+}
+
+std::string words_of(const Unexplained& u, const std::optional<ErrorBounds>& bounds, const std::string& evidence) {
+  if (!u.large())
+    return comparison_in_words(u, bounds) +
+           (u.learner ? " A random forest over all covariates predicts no large part of the error."
+                      : " There are too few predictions for a random forest to look for a pattern in the error.");
   const double error_mm = u.error_mm > 0 ? u.error_mm : u.learner->error_mm;
   std::string out = fmt::format(
       "Of the prediction error of {:.2f} mm, {:.2f} mm are systematic and unexplained ({:.0f} % of the mean square "
@@ -189,7 +226,7 @@ Unexplained find_unexplained(const MeasuredSet& set, const std::vector<Window>& 
                                   : patterns_of(known, held_out, kShown);
     if (u.patterns.size() > kMostPatterns) u.patterns.resize(kMostPatterns);
   }
-  u.in_words = words_of(u, gap.evidence);
+  u.in_words = words_of(u, bounds, gap.evidence) + odd_robot_in_words(set, errors);
   return u;
 }
 

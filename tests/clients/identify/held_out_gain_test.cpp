@@ -50,25 +50,25 @@ TEST(HeldOutGain, IsTheLogLikelihoodRatio) {
   const MeasuredSet set = straight_on(8);
   PreparedSet prepared(set);
   const MotionModel right = at_speed(kSpeed_mm_s), wrong = at_speed(kSpeed_mm_s - 1);
-  const HeldOutGain gain = held_out_gain(right, wrong, prepared, false, 1);
+  const HeldOutGain gain = held_out_gain(right, wrong, prepared, Tracks::kAll, 1);
   EXPECT_GT(gain.nat, 5 * gain.nat_se);
   EXPECT_GT(gain.nat_se, 0);
-  const HeldOutGain less = held_out_gain(wrong, right, prepared, false, 1);
+  const HeldOutGain less = held_out_gain(wrong, right, prepared, Tracks::kAll, 1);
   EXPECT_DOUBLE_EQ(less.nat, -gain.nat);
   EXPECT_DOUBLE_EQ(less.nat_se, gain.nat_se);
-  EXPECT_EQ(held_out_gain(right, right, prepared, false, 1).nat, 0);
+  EXPECT_EQ(held_out_gain(right, right, prepared, Tracks::kAll, 1).nat, 0);
 }
 
 TEST(HeldOutGain, TrainingTracksDoNotCount) {
   MeasuredSet set = straight_on(8);
   const MotionModel right = at_speed(kSpeed_mm_s), wrong = at_speed(kSpeed_mm_s - 1);
-  const auto gain = [&](bool held_out_only) {
+  const auto gain = [&](Tracks of) {
     PreparedSet prepared(set);
-    return held_out_gain(right, wrong, prepared, held_out_only, 1).nat;
+    return held_out_gain(right, wrong, prepared, of, 1).nat;
   };
-  const double all = gain(false), held_out = gain(true);
+  const double all = gain(Tracks::kAll), held_out = gain(Tracks::kHeldOut);
   for (Track& track : set.runs.front().tracks) track.held_out = !track.held_out;
-  EXPECT_NEAR(held_out + gain(true), all, 1e-9 * all);
+  EXPECT_NEAR(held_out + gain(Tracks::kHeldOut), all, 1e-9 * all);
   EXPECT_LT(held_out, 0.7 * all);
 }
 

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
 
 #include "clients/identify/identify.hpp"
 #include "clients/identify/predict/evaluation.hpp"
@@ -38,7 +39,7 @@ MeasuredSet driven_straight(std::uint32_t robots, std::uint32_t runs, double dur
 
 HeldOut held_out_of(MeasuredSet set) {
   hold_out_part(set);
-  return Evaluation(set, nullptr, 1).held_out();
+  return Evaluation(set, nullptr, Tracks::kReporting, 1).held_out();
 }
 
 TEST(HeldOut, DependsOnRunsAndRobots) {
@@ -49,7 +50,7 @@ TEST(HeldOut, DependsOnRunsAndRobots) {
   EXPECT_EQ(held_out_of(driven_straight(4, 1, 5, 1)), HeldOut::kRobots);
   EXPECT_EQ(held_out_of(driven_straight(2, 3, 5, 1)), HeldOut::kRuns);
   const MeasuredSet set = driven_straight(1, 1, 5, 1);
-  EXPECT_EQ(Evaluation(set, &set, 1).held_out(), HeldOut::kTestSet);
+  EXPECT_EQ(Evaluation(set, &set, Tracks::kReporting, 1).held_out(), HeldOut::kTestSet);
 }
 
 TEST(HeldOut, WithoutItNoErrorIsReported) {
@@ -79,35 +80,57 @@ TEST(HeldOut, TracksWithoutAPredictedTimeGiveNoError) {
   EXPECT_EQ(result.at("held_out").at("kind"), "no predicted time");
 }
 
-/// Errors of a model on tracks of some robots in two runs: every track has this root mean square, times its factor.
-PredictionErrors errors_with(double rmse_mm, double odd_factor = 1) {
-  PredictionErrors errors;
-  for (std::uint32_t run = 0; run < 2; ++run) {
-    for (std::uint32_t place = 0; place < 8; ++place) {
-      const double mm = rmse_mm * (place % 2 == 1 ? odd_factor : 1);
-      errors.by_track[{run, place}] = {10 * mm * mm, 10};
-      errors.sum_mm2 += 10 * mm * mm;
-      errors.rows += 10;
-    }
-  }
-  return errors;
+TEST(HeldOut, HalfOfItChooses) {
+  const auto count = [](const MeasuredSet& set, Tracks which) {
+    std::size_t sum = 0;
+    for (const auto& run : set.runs)
+      for (const Track& track : run.tracks) sum += counts(track, which) ? 1U : 0U;
+    return sum;
+  };
+  MeasuredSet runs = driven_straight(6, 3, 5, 1), robots = driven_straight(8, 1, 5, 1),
+              one = driven_straight(1, 2, 5, 1);
+  for (MeasuredSet* set : {&runs, &robots, &one}) hold_out_part(*set);
+  EXPECT_EQ(count(runs, Tracks::kChoosing), 3U);
+  EXPECT_EQ(count(runs, Tracks::kReporting), 3U);
+  EXPECT_EQ(count(robots, Tracks::kChoosing), 1U);
+  EXPECT_EQ(count(robots, Tracks::kReporting), 1U);
+  // A single track gives the error.
+  EXPECT_EQ(count(one, Tracks::kChoosing), 0U);
+  EXPECT_EQ(count(one, Tracks::kReporting), 1U);
 }
 
-TEST(FinalCheck, TheLastModelThatIsNotWorseStays) {
-  const MeasuredSet set = driven_straight(8, 2, 5, 1);
+TEST(HeldOut, BesideATestSetEachRobotAndRunStaysInTheFit) {
+  for (const std::uint32_t robots : {1U, 3U, 8U}) {
+    MeasuredSet set = driven_straight(robots, 5, 5, 1);
+    hold_out_for_choice(set);
+    std::size_t held = 0;
+    std::set<std::uint32_t> in_fit;
+    for (const auto& run : set.runs) {
+      for (const Track& track : run.tracks) {
+        EXPECT_EQ(track.held_out, track.chooses);
+        held += track.held_out ? 1U : 0U;
+        if (!track.held_out) in_fit.insert(track.robot);
+      }
+    }
+    EXPECT_EQ(held, robots) << "one track in five";
+    EXPECT_EQ(in_fit.size(), robots);
+  }
+}
+
+TEST(FinalCheck, TheSmallestOfTheBestStays) {
   // Better and better: the last.
-  EXPECT_EQ(last_not_worse(set, {errors_with(10), errors_with(6), errors_with(4)}), 2U);
-  // The last is worse than the one before, in all tracks.
-  EXPECT_EQ(last_not_worse(set, {errors_with(10), errors_with(6), errors_with(7)}), 1U);
-  // All are worse than the base model.
-  EXPECT_EQ(last_not_worse(set, {errors_with(23), errors_with(40), errors_with(63)}), 0U);
-  // Worse than the one before in half of the tracks, better in the others: within chance.
-  EXPECT_EQ(last_not_worse(set, {errors_with(10), errors_with(6), errors_with(5.8, 1.08)}), 2U);
-  // Within chance of the base model, but not below it.
-  EXPECT_EQ(last_not_worse(set, {errors_with(6), errors_with(5.8, 1.09)}), 0U);
+  EXPECT_EQ(smallest_of_the_best({{0, 10}, {1, 6}, {2, 4}}), 2U);
+  // The last is worse than the one before.
+  EXPECT_EQ(smallest_of_the_best({{0, 10}, {1, 6}, {2, 7}}), 1U);
+  // The last is better by less than 0.1 %.
+  EXPECT_EQ(smallest_of_the_best({{0, 10}, {1, 6}, {2, 5.999}}), 1U);
+  // As good, with a further effect of the measurement, which does not count as size.
+  EXPECT_EQ(smallest_of_the_best({{0, 10}, {1, 6}, {1, 6}}), 2U);
+  EXPECT_EQ(smallest_of_the_best({{0, 23}, {1, 40}, {2, 63}}), 0U);
   // No number.
-  EXPECT_EQ(last_not_worse(set, {errors_with(6), errors_with(std::nan(""))}), 0U);
-  EXPECT_EQ(last_not_worse(set, {errors_with(6)}), 0U);
+  EXPECT_EQ(smallest_of_the_best({{0, 6}, {1, std::nan("")}}), 0U);
+  EXPECT_EQ(smallest_of_the_best({{0, std::nan("")}, {1, 5}}), 1U);
+  EXPECT_EQ(smallest_of_the_best({{0, std::nan("")}}), 0U);
 }
 
 /// Speeds swing by 4 mm/s with the time of the run, with a period of 50 s; `sign` -1: off by half a period.
@@ -119,11 +142,14 @@ void swing(MeasuredSet& set, double sign) {
 }
 
 TEST(FinalCheck, AnEffectThatHoldsInTheFitOnlyIsNotWritten) {
-  // The clock of the test data is off by half a period.
-  MeasuredSet train = driven_straight(6, 2, 80, 4), test = driven_straight(6, 1, 50, 5);
-  swing(train, 1);
-  swing(test, -1);
-  const Identified found = identify(train, &test, {});
+  // The clock of the last run is off by half a period.
+  MeasuredSet set = driven_straight(6, 3, 80, 4);
+  hold_out_part(set);
+  MeasuredSet first = set, last = set;
+  swing(first, 1);
+  swing(last, -1);
+  set.runs = {first.runs[0], first.runs[1], last.runs[2]};
+  const Identified found = identify(set, nullptr, {});
   const auto& result = found.document.at("contract");
   EXPECT_LE(result.at("after").at("rmse_mm").get<double>(),
             1.001 * result.at("before").at("rmse_mm").get<double>());
@@ -133,6 +159,27 @@ TEST(FinalCheck, AnEffectThatHoldsInTheFitOnlyIsNotWritten) {
   EXPECT_GT(check.at("path").back().at("rmse_mm").get<double>(), check.at("path")[0].at("rmse_mm").get<double>());
   EXPECT_FALSE(check.at("dropped").empty());
   EXPECT_TRUE(result.at("effects").empty());
+}
+
+TEST(FinalCheck, ATestSetDoesNotChoose) {
+  MeasuredSet train = driven_straight(6, 2, 80, 4), like = driven_straight(6, 1, 50, 5), unlike = like;
+  hold_out_for_choice(train);
+  swing(train, 1);
+  swing(like, 1);
+  swing(unlike, -1);
+  const Identified one = identify(train, &like, {}), other = identify(train, &unlike, {});
+  EXPECT_EQ(one.model.SerializeAsString(), other.model.SerializeAsString());
+  const auto& result = one.document.at("contract");
+  ASSERT_FALSE(result.at("effects").empty());
+  for (const auto& effect : result.at("effects"))
+    EXPECT_GT(effect.at("evidence").at("held_out_gain").get<double>(), 0);
+  EXPECT_LT(result.at("after").at("rmse_mm").get<double>(), 0.5 * result.at("before").at("rmse_mm").get<double>());
+  EXPECT_FALSE(result.at("check").contains("in_words"));
+  // The written model is worse than the base model there, and the result says so.
+  const auto& worse = other.document.at("contract");
+  EXPECT_GT(worse.at("after").at("rmse_mm").get<double>(), worse.at("before").at("rmse_mm").get<double>());
+  EXPECT_NE(worse.at("check").at("in_words").get<std::string>().find("larger than that of the base model"),
+            std::string::npos);
 }
 
 }  // namespace

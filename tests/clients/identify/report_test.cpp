@@ -97,7 +97,7 @@ TEST(Report, SaysThatThereIsNoEffect) {
   json document = full_document();
   document["contract"]["effects"] = json::array();
   const std::string page = report_html(document);
-  EXPECT_NE(page.find("The base model explains these data"), std::string::npos);
+  EXPECT_NE(page.find("No tested effect improves on the base model"), std::string::npos);
   EXPECT_EQ(page.find("id=\"why\""), std::string::npos);
 }
 

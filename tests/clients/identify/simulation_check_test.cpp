@@ -81,7 +81,7 @@ void perform(MeasuredSet& set, const MotionModel& model, std::uint64_t seed) {
 nlohmann::json checked(MeasuredSet& set, const MotionModel& base, const MotionModel& full) {
   PreparedSet prepared(set);
   const proto::Model written_base = proto_of(base), written_full = proto_of(full);
-  return simulation_check({base, written_base}, {full, written_full}, prepared, false, 2);
+  return simulation_check({base, written_base}, {full, written_full}, prepared, Tracks::kAll, 2);
 }
 
 TEST(SimulationCheck, TheGeneratingModelAgrees) {

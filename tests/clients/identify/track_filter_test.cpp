@@ -5,6 +5,9 @@
 
 #include <cmath>
 
+#include "clients/identify/fit/filter_bank.hpp"
+#include "clients/identify/fit/prepared_set.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -54,6 +57,23 @@ TEST(TrackFilter, AnUnmeasuredHeadingKeepsItsInitialValue) {
   EXPECT_EQ(filter.belief().mean[2], 0.7);
   EXPECT_NEAR(filter.expected(2, {})[0], sample.x_mm, 0.01);
   EXPECT_NEAR(filter.expected(2, {})[1], sample.y_mm, 0.01);
+}
+
+TEST(FilterBank, KeepsAHypothesisIfNoWeightIsFinite) {
+  MeasuredSet set;
+  Track& track = set.runs.emplace_back(identify::Run{"r", {}}).tracks.emplace_back();
+  track.commands = {{-1e300, Motion::kStraight}};
+  for (int k = 0; k < 5; ++k) track.samples.push_back({1.0 * k, 10.0 * k, 0, std::nan("")});
+  const PreparedSet prepared(set);
+  MotionModel model;
+  // The determinant of the innovations' covariance is beyond the largest number.
+  model.noise.position_mm2 = 1e200;
+  FilterBank bank(model, prepared.views().front());
+  for (const Sample& sample : track.samples) {
+    bank.advance_to(sample.time_s);
+    ASSERT_FALSE(bank.hypotheses().empty()) << sample.time_s;
+    for (const FilterBank::Hypothesis& h : bank.hypotheses()) EXPECT_TRUE(std::isfinite(h.log_weight));
+  }
 }
 
 }  // namespace

@@ -135,5 +135,35 @@ TEST(Unexplained, AnErrorBeyondTheExpectationIsSaidEvenWithoutAPattern) {
   EXPECT_NE(by_repetitions.in_words.find("repetitions"), std::string::npos) << by_repetitions.in_words;
 }
 
+TEST(Unexplained, SaysWhatWasComparedAndWhatWasNot) {
+  const Sets sets = windows_with([](const Window&) { return 0.0; }, 3, 5);
+  const PredictionErrors errors = errors_by_track(sets.held_out, 3.5);
+  const auto words = [&](const std::vector<Window>& held_out, const PredictionErrors& of,
+                         const std::optional<ErrorBounds>& bounds) {
+    const Unexplained u = find_unexplained(sets.set, sets.known, held_out, of, bounds, {});
+    EXPECT_FALSE(u.large());
+    return u.in_words;
+  };
+  const auto says = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };
+  // The error is 4.2 mm. Its interval holds the 3.5 mm that the model expects, or does not exist.
+  const std::string unsure = words(sets.held_out, errors, ErrorBounds{{3, 6}, {3, 6}, {-1, 1}, 12, 2});
+  EXPECT_TRUE(says(unsure, "too few data are held out")) << unsure;
+  const std::string one_track = words(sets.held_out, errors, {});
+  EXPECT_TRUE(says(one_track, "one held-out track only")) << one_track;
+  const std::string nothing = words({}, {}, {});
+  EXPECT_TRUE(says(nothing, "Nothing is held out")) << nothing;
+  const std::string within =
+      words(sets.held_out, errors_by_track(sets.held_out, 4.2), ErrorBounds{{3, 6}, {3, 6}, {-1, 1}, 12, 2});
+  EXPECT_TRUE(says(within, "is within what the model expects")) << within;
+  for (const std::string& text : {unsure, one_track, nothing})
+    EXPECT_FALSE(says(text, "within what the model expects")) << text;
+}
+
+TEST(Unexplained, NamesARobotWithAFarLargerError) {
+  const auto lame = [](const Window& w) { return w[Feature::kRobot] == 5 ? 25.0 : 0.0; };
+  const Unexplained u = unexplained_in(windows_with(lame, 2, 4), 2 * std::sqrt(2.0));
+  EXPECT_NE(u.in_words.find("Robot 5 has an error of"), std::string::npos) << u.in_words;
+}
+
 }  // namespace
 }  // namespace kilotwin::identify

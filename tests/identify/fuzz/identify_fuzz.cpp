@@ -1,5 +1,5 @@
 // Runs `kilotwin identify` on small sets with random oddities. Each run must end within its time and memory: with status
-// 0 and complete files of finite numbers, or with status 2, one line for people, and no files.
+// 0, complete files of finite numbers and a model that `kilotwin run --model` takes, or with status 2, one line for people, and no files.
 // Usage: identify_fuzz [--program KILOTWIN] [--seed N] [--sets N] [--keep DIR] [--jobs N] [--seconds S]
 // The sets have the seeds N, N + 1, ... The default of 12 sets is the quick mode; `--sets 1000` is the long one.
 #include <fmt/format.h>
@@ -13,6 +13,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "core/experiment/load.hpp"
+#include "core/experiment/validate.hpp"
 #include "core/os/worker_pool.hpp"
 #include "tests/identify/fuzz/odd_set.hpp"
 #include "tests/identify/truth/dice.hpp"
@@ -38,6 +40,20 @@ std::string text_of(const fs::path& file) {
   return text.str();
 }
 
+/// What `kilotwin run --model` would say of the model; empty: it takes it.
+std::string refusal_of_model(const fs::path& out) {
+  std::ofstream(out / "program.c") << "int main(void) { return 0; }\n";
+  std::ofstream(out / "experiment.txtpb") << "robots { count: 1 behaviour: 'program.c' }\n";
+  try {
+    kilotwin::LoadedExperiment loaded = kilotwin::load_experiment(out / "experiment.txtpb");
+    kilotwin::apply_model(loaded, out / "model.txtpb");
+    kilotwin::validate(loaded);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return {};
+}
+
 /// What is wrong with the files of a run that succeeded; empty: nothing.
 std::string fault_of_files(const fs::path& out) {
   for (const char* name : {"report.html", "model.txtpb", "result.json", "predictions.csv"})
@@ -59,7 +75,7 @@ std::string fault_of_files(const fs::path& out) {
   } catch (const std::exception& error) {
     return fmt::format("result.json: {}", error.what());
   }
-  return {};
+  return refusal_of_model(out);
 }
 
 /// What is wrong with a run; empty: nothing.

@@ -24,18 +24,26 @@ struct Row {
 struct Layout {
   int robots, runs;
   double duration_s, sample_s, jitter, room_mm, noise_mm;
+  double apart_mm;  ///< between the rooms of two runs
+  double tired;     ///< share of the speed that is lost within 60 s
+  bool slow_half;   ///< half of the robots drive at half speed where x > 0
   bool commands, commands_rest;
 };
 
 Layout layout_of(Dice& dice) {
   constexpr std::array kSamples_s = {0.05, 0.2, 0.5, 1.0, 2.5, 5.0, 20.0};
   Layout l{};
-  l.robots = 1 + dice.pick(6);
+  const bool many = dice.uniform() < 0.1;
+  l.robots = many ? 30 : 1 + dice.pick(6);
   l.runs = 1 + dice.pick(3);
   l.duration_s = dice.between(5, 90);
   l.sample_s = kSamples_s[static_cast<std::size_t>(dice.pick(kSamples_s.size()))];
   // A raster of many samples needs time, and shows nothing that fewer do not.
   if (l.sample_s < 0.1) l.duration_s = std::min(l.duration_s, 20.0);
+  if (many) l.duration_s = std::min(l.duration_s, 40.0);
+  l.apart_mm = dice.uniform() < 0.1 ? dice.between(1e4, 4e5) : 0;
+  l.tired = dice.uniform() < 0.3 ? dice.between(0.1, 0.9) : 0;
+  l.slow_half = dice.uniform() < 0.2;
   l.jitter = dice.uniform() < 0.5 ? 0 : dice.between(0, 0.9);
   l.room_mm = dice.uniform() < 0.3 ? 100 : dice.between(100, 3000);
   l.noise_mm = dice.uniform() < 0.2 ? 0 : dice.between(0.1, 2);
@@ -45,8 +53,8 @@ Layout layout_of(Dice& dice) {
 }
 
 /// Drives one robot of one run, and appends its rows and commands.
-void drive(const Layout& l, Dice& dice, const std::string& run, std::uint32_t robot, std::vector<Row>& rows,
-           std::string& commands) {
+void drive(const Layout& l, Dice& dice, const std::string& run, double from_x_mm, std::uint32_t robot,
+           std::vector<Row>& rows, std::string& commands) {
   double x = dice.between(-0.5, 0.5) * l.room_mm, y = dice.between(-0.5, 0.5) * l.room_mm,
          heading = dice.between(-M_PI, M_PI), next_sample_s = 0, next_command_s = 0;
   int motion = 1;
@@ -58,11 +66,17 @@ void drive(const Layout& l, Dice& dice, const std::string& run, std::uint32_t ro
       next_command_s = t + dice.between(0.5, 12);
     }
     if (t >= next_sample_s) {
-      rows.push_back({run, robot, t, x + l.noise_mm * dice.normal(), y + l.noise_mm * dice.normal(),
+      rows.push_back({run, robot, t, from_x_mm + x + l.noise_mm * dice.normal(), y + l.noise_mm * dice.normal(),
                       heading + 0.03 * dice.normal()});
       next_sample_s += l.sample_s * (1 + l.jitter * dice.between(-0.5, 0.5));
     }
-    const double left = motion == 1 ? 10 : motion == 3 ? 20 : 0, right = motion == 1 ? 10 : motion == 2 ? 20 : 0;
+    const double speed = (1 - l.tired * std::min(1.0, t / 60)) * (l.slow_half && robot % 2 == 1 && x > 0 ? 0.5 : 1);
+    const double left = speed * (motion == 1   ? 10
+                                 : motion == 3 ? 20
+                                               : 0),
+                 right = speed * (motion == 1   ? 10
+                                  : motion == 2 ? 20
+                                                : 0);
     x = std::clamp(x + kStep_s * (left + right) / 2 * std::cos(heading), -0.5 * l.room_mm, 0.5 * l.room_mm);
     y = std::clamp(y + kStep_s * (left + right) / 2 * std::sin(heading), -0.5 * l.room_mm, 0.5 * l.room_mm);
     heading += kStep_s * (right - left) / 25;
@@ -162,9 +176,10 @@ OddSet odd_set(std::uint64_t seed) {
   for (int run = 0; run < l.runs; ++run)
     for (int robot = 0; robot < l.robots; ++robot)
       if (dice.uniform() < 0.95)
-        drive(l, dice, fmt::format("r{}", run), static_cast<std::uint32_t>(robot), rows, set.commands);
-  set.oddities.push_back(
-      fmt::format("{} robots, {} runs, {:.0f} s, every {} s", l.robots, l.runs, l.duration_s, l.sample_s));
+        drive(l, dice, fmt::format("r{}", run), run * l.apart_mm, static_cast<std::uint32_t>(robot), rows,
+              set.commands);
+  set.oddities.push_back(fmt::format("{} robots, {} runs {:.0f} m apart, {:.0f} s, every {} s", l.robots, l.runs,
+                                     l.apart_mm / 1000, l.duration_s, l.sample_s));
   while (dice.uniform() < 0.45) set.oddities.push_back(spoil(rows, dice));
   set.trajectories = headings ? "run,robot,time_s,x_mm,y_mm,heading_rad\n" : "run,robot,time_s,x_mm,y_mm\n";
   for (const Row& r : rows) {

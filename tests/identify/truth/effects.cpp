@@ -155,6 +155,18 @@ Effect half_the_room(double strength) {
           {}};
 }
 
+Effect combed_half(double strength) {
+  return {"combed-half",
+          "speed is 1 + 0.4 cos(2 heading - 0.9) / (1 + exp(-(x + 40 mm) / 35 mm))",
+          {{"position", "heading"}},
+          {"robot", "time"},
+          [=](const Situation& at, Push& push) {
+            const double there = 1 / (1 + std::exp(-(at.disc.x + 40) / 35));
+            slow_both(push, 1 + 0.4 * strength * there * std::cos(2 * at.heading_rad - 0.9));
+          },
+          {}};
+}
+
 Effect lamp(double strength) {
   return {"lamp",
           "from 64.5 s on speed is 1 + 0.45 / (1 + exp(-(0.8 x + 0.6 y - 60 mm) / 35 mm))",

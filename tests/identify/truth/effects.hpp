@@ -23,6 +23,7 @@ Effect lamp(double strength = 1);              // robots are faster in a part of
 Effect drying_patch(double strength = 1);      // a wet patch of floor that dries
 Effect growing_grain(double strength = 1);     // the floor develops a grain during a run
 Effect half_the_room(double strength = 1);     // half of the robots are slow in half of the arena
+Effect combed_half(double strength = 1);       // half of the floor has a grain
 Effect travelling_waves(double strength = 1);  // stripes of slow floor travel over the arena
 Effect tilt(double strength = 1);              // vibrating robots slide down a tilted table
 Effect draught(double strength = 1);           // an intermittent draught moves all robots, also at rest

@@ -95,6 +95,8 @@ const Entry kEntries[] = {
      [] { return with(tidy_lab(), Effects{growing_grain()}); }},
     {"half-the-room", "position and robot: half of the robots are slow in half of the room",
      [] { return with(tidy_lab(), Effects{half_the_room()}); }},
+    {"combed-half", "position and heading: half of the floor has a grain",
+     [] { return with(tidy_lab(), Effects{combed_half()}); }},
     {"lamp", "position and time: a lamp is switched on", [] { return with(blind_lab(), Effects{lamp()}); }},
     {"fresh-batteries", "history: every run has batteries of its own",
      [] { return with(tidy_lab(), Effects{batteries_of_the_day()}); }},

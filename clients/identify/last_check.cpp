@@ -1,0 +1,146 @@
+#include "clients/identify/last_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <optional>
+#include <utility>
+
+#include "clients/identify/predict/final_check.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+bool on_measurement(const Term& term) { return is_measured(term.blocks.front().target); }
+
+void take_out(Search& found, std::size_t t, FitState without) {
+  found.fit = std::move(without);
+  found.reasons.erase(found.reasons.begin() + static_cast<std::ptrdiff_t>(t));
+}
+
+/// The models on the way of the search with fewer terms than its result, and the result.
+std::vector<Stage> path_to(const Search& found) {
+  std::vector<Stage> path;
+  const std::size_t terms = found.fit.model.terms.size();
+  std::copy_if(found.path.begin(), found.path.end(), std::back_inserter(path),
+               [&](const Stage& stage) { return stage.fit.model.terms.size() < terms; });
+  if (terms == 0) path.push_back(found.path.front());
+  if (terms == 0 && found.fit.model.base.command_lag_s == path.front().fit.model.base.command_lag_s) return path;
+  path.push_back({found.fit, found.reasons});
+  return path;
+}
+
+std::vector<std::string> effects_of(const MotionModel& model) {
+  std::vector<std::string> names;
+  for (const Term& term : model.terms)
+    if (std::find(names.begin(), names.end(), term.name) == names.end()) names.push_back(term.name);
+  return names;
+}
+
+bool holds(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+/// Everything about dropped effects leaves the findings, except that they were dropped.
+void note_dropped(Findings& f, const Stage& last) {
+  const std::vector<std::string> kept = effects_of(f.found.fit.model);
+  for (std::size_t t = 0; t < last.fit.model.terms.size(); ++t) {
+    const std::string& name = last.fit.model.terms[t].name;
+    if (holds(kept, name) || holds(f.check.dropped, name)) continue;
+    f.check.dropped.push_back(name);
+    const Reason& reason = last.reasons[t];
+    f.found.rejected.insert(f.found.rejected.begin(),
+                            {name, reason.covariates, reason.acts_on, reason.finding.log10_p,
+                             reason.threshold_log10_p, "held-out data are predicted no better with it"});
+  }
+  std::erase_if(f.found.steps, [&](const Step& step) { return !holds(kept, step.added); });
+  std::erase_if(f.found.ambiguous, [&](const Ambiguity& a) { return !holds(kept, a.found); });
+}
+
+/// The model without one term, on the tracks that choose.
+struct Trial {
+  FitState without;
+  HeldOutGain gain;  ///< of the model with the term over the one without
+  bool useless;
+};
+
+Trial trial_of(const Fitter& fitter, const FitState& fit, std::size_t t, const Evaluation& choosing,
+               const ForecastTimes& times, const Judged& with) {
+  FitState without = without_term(fitter, fit, t);
+  const double with_mm = with.errors.rmse_mm(), without_mm = choosing.judge(without, times).errors.rmse_mm();
+  const HeldOutGain gain = held_out_gain(fit.model, without.model, with.tracks, choosing.of(), fitter.threads());
+  // Effects of the measurement hardly change predicted positions. They must not raise the error.
+  const double least_mm = with_mm * (on_measurement(fit.model.terms[t]) ? 1 - kSameError : 1 + kSameError);
+  // Negated, so that a gain that is no number does not pass.
+  return {std::move(without), gain, !(gain.nat >= 0) || without_mm <= least_mm};
+}
+
+/// Takes out terms one at a time: of those that do not help the one with the least gain.
+void take_out_useless(Findings& f, const Fitter& fitter, const Evaluation& choosing, const ForecastTimes& times) {
+  for (;;) {
+    const Judged with = choosing.judge(f.found.fit, times);
+    f.check.gains.clear();
+    std::optional<Trial> worst;
+    std::size_t place = 0;
+    for (std::size_t t = 0; t < f.found.fit.model.terms.size(); ++t) {
+      Trial trial = trial_of(fitter, f.found.fit, t, choosing, times, with);
+      f.check.gains.push_back(trial.gain);
+      if (!trial.useless || (worst && !(trial.gain.nat < worst->gain.nat))) continue;
+      worst = std::move(trial);
+      place = t;
+    }
+    if (!worst) return;
+    take_out(f.found, place, std::move(worst->without));
+  }
+}
+
+}  // namespace
+
+FitState without_term(const Fitter& fitter, const FitState& fit, std::size_t term) {
+  FitState less = fit;
+  less.model.terms.erase(less.model.terms.begin() + static_cast<std::ptrdiff_t>(term));
+  fitter.fit(less, 1);
+  return less;
+}
+
+void keep_predictive_terms(const Fitter& fitter, const MeasuredSet& train, const ForecastTimes& times,
+                           Search& found) {
+  const auto error_mm = [&](const FitState& state) {
+    return errors_of(train, forecast(state.model, state.tracks, times, Tracks::kFit, fitter.threads())).rmse_mm();
+  };
+  if (found.fit.model.terms.empty()) return;
+  double with_mm = error_mm(found.fit);
+  for (std::size_t t = found.fit.model.terms.size(); t-- > 0;) {
+    FitState without = without_term(fitter, found.fit, t);
+    const double without_mm = error_mm(without);
+    // Measurement effects need not reduce the error. They must not raise it.
+    if (without_mm > with_mm * (on_measurement(found.fit.model.terms[t]) ? 0.9995 : 1.0005)) continue;
+    take_out(found, t, std::move(without));
+    with_mm = without_mm;
+  }
+}
+
+void choose_on_held_out(Findings& f, const Fitter& fitter, const Evaluation& choosing, const ForecastTimes& times) {
+  const std::vector<Stage> path = path_to(f.found);
+  std::vector<Candidate> candidates;
+  for (const Stage& stage : path) {
+    const std::vector<Term>& terms = stage.fit.model.terms;
+    const auto moving = std::count_if(terms.begin(), terms.end(), [](const Term& t) { return !on_measurement(t); });
+    candidates.push_back({static_cast<std::size_t>(moving), choosing.judge(stage.fit, times).errors.rmse_mm()});
+    f.check.path.push_back({effects_of(stage.fit.model), candidates.back().rmse_mm});
+  }
+  f.check.kept = smallest_of_the_best(candidates);
+  f.found.fit = path[f.check.kept].fit;
+  f.found.reasons = path[f.check.kept].reasons;
+  take_out_useless(f, fitter, choosing, times);
+  // Negated, so that an error that is no number does not pass.
+  if (!(choosing.judge(f.found.fit, times).errors.rmse_mm() <= candidates.front().rmse_mm * (1 + kSameError))) {
+    f.found.fit = path.front().fit;
+    f.found.reasons.clear();
+    f.check.gains.clear();
+    f.check.kept = 0;
+  }
+  note_dropped(f, path.back());
+}
+
+}  // namespace kilotwin::identify
