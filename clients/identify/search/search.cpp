@@ -25,7 +25,7 @@ namespace {
 /// Limits of a search: accepted changes without general terms, hypotheses that failed after their refit, and work
 /// (PreparedSet::work). A set of 24 robots, 3 runs and 300 s stays far below the last one.
 constexpr int kMostRounds = 7, kMostFailed = 20;
-constexpr std::uint64_t kMostWork = 40'000'000'000;
+constexpr std::uint64_t kMostWork = 3'000'000'000;
 /// Hypotheses with more alternatives (as a logarithm) than this, single steps and pulses, are no alternatives in
 /// an exchange.
 constexpr double kManyChoices = 2.5;

@@ -2,7 +2,9 @@
 // the fitted model.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <map>
 #include <string>
 
 #include "clients/identify/model/effect_records.hpp"
@@ -298,6 +300,36 @@ TEST_F(WrittenModel, PredictsLikeTheFittedModel) {
       EXPECT_LT(most_rad, 0.005) << name_of(target) << " by " << form.name;
     }
   }
+}
+
+TEST(WrittenModelFile, GainsOfTwoTermsOfOneNameMultiply) {
+  // A product of a curve over time and harmonics of the heading, twice.
+  Term term;
+  term.name = "speed-by-heading-and-time";
+  Factor time = over(Shape::kCosines, Covariate::kTime, 0, 20, 2),
+         heading = over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 1);
+  term.blocks = {{Target::kGain, Basis{{time, heading}}}};
+  term.coefficients = term.precision = Eigen::VectorXd::Constant(4, 0.1);
+  MotionModel model;
+  model.terms = {term, term};
+  std::map<std::string, int> sums;
+  const proto::Model written = proto_of(model);
+  for (const proto::Effect& effect : written.effect())
+    if (effect.acts_on() == proto::Effect::WHEEL_GAIN) ++sums[effect.sum()];
+  ASSERT_EQ(sums.size(), 2U);
+  EXPECT_EQ(sums.begin()->second, sums.rbegin()->second);
+}
+
+TEST(WrittenModelFile, TheDiscCentreIsWithinTheBody) {
+  MotionModel model;
+  model.base.centre_mm = model.base.ahead_mm = 30;
+  const proto::Model written = proto_of(model);
+  EXPECT_EQ(written.motion().axle_offset_mm(), 16.5);
+  // The tracked point stays where it is.
+  const auto point = std::find_if(written.effect().begin(), written.effect().end(),
+                                  [](const proto::Effect& e) { return e.name() == "tracked-point"; });
+  ASSERT_NE(point, written.effect().end());
+  EXPECT_NEAR(point->function(0).constant(), 13.5, 1e-6);
 }
 
 }  // namespace

@@ -63,6 +63,14 @@ TEST(Plausible, WrongUnitsAreReported) {
   says([](Sample& s) { s.x_mm = 300 * std::round(s.x_mm / 300), s.y_mm = 0; }, "commanded robots drive");
 }
 
+TEST(Plausible, RobotNumbersThatNoModelFileTakesAreReported) {
+  MeasuredSet set = good();
+  set.runs[0].tracks.back().robot = 99'999;
+  EXPECT_NO_THROW(demand_plausible(set, "DIR"));
+  set.runs[0].tracks.back().robot = 100'000;
+  EXPECT_THROW(demand_plausible(set, "DIR"), UserError);
+}
+
 TEST(Plausible, RecordingsInOneRunAreReported) {
   const std::string text = complaint([](Sample& s) { s.time_s += s.x_mm > 800 ? 3e5 : 0; });
   EXPECT_NE(text.find("give each recording a run of its own"), std::string::npos) << text;
