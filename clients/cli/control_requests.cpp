@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <iostream>
 #include <limits>
 #include <vector>
@@ -46,7 +48,10 @@ Status act(RunControl& control, const ControlRequest& request, const Status& bef
     return control.find(request.patience);
   }
   ask(kilotwin_open_CHECKPOINT_RUN);
-  return control.await([&](const Status& now) { return now.saved_tick > 0 && now.saved_tick >= before.tick; },
+  // A paused run may have saved its state at this tick before. One that runs saves a later one.
+  const bool is_paused = before.phase == kilotwin_open_PAUSED;
+  const std::int64_t least = is_paused ? before.tick : std::max(before.tick, before.saved_tick) + 1;
+  return control.await([&](const Status& now) { return now.saved_tick > 0 && now.saved_tick >= least; },
                        "save its state", request.patience);
 }
 

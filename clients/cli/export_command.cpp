@@ -65,14 +65,17 @@ int export_run(const ExportArguments& arguments) {
         "or "
         ".arrow");
   }
+  if (arguments.report == "-") throw UserError("--report -: needs a file; give --report FILE.html");
+  const bool to_output = std::any_of(tables.begin(), tables.end(), [](const auto* table) { return *table == "-"; });
+  const auto note = [&](const std::string& line) { to_output ? say(line) : fmt::print("{}\n", line); };
   if (!arguments.model.empty()) {
     const auto run = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kManifest);
-    fmt::print("{}: {} robots\n", arguments.model.string(), export_model(read_manifest(run), arguments.model));
+    note(fmt::format("{}: {} robots", arguments.model.string(), export_model(read_manifest(run), arguments.model)));
   }
   if (!arguments.report.empty()) {
     const auto run = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kManifest);
     os::write_file(arguments.report, run_report(run));
-    fmt::print("{}: the page of the run\n", arguments.report.string());
+    note(fmt::format("{}: the page of the run", arguments.report.string()));
   }
   if (!rows_wanted) return kDone;
   if (arguments.mcap == "-") throw UserError("--mcap -: needs a file; give --mcap FILE.mcap");

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -20,6 +22,7 @@
 #include "clients/report/html.hpp"
 #include "clients/report/plot.hpp"
 #include "clients/report/templates.hpp"
+#include "core/base/say.hpp"
 #include "core/os/files.hpp"
 #include "core/plan/effect_settings.hpp"
 #include "core/plan/motion_settings.hpp"
@@ -37,6 +40,8 @@ using recorder::Summary;
 
 /// Points of a curve on the page; of longer ones every n-th is shown.
 constexpr std::size_t kMostPoints = 600;
+/// States times robots of which a run draws curves by itself: that takes some 3 s. A recorded state has some 26 octets per robot.
+constexpr std::uint64_t kMostRobotStates = 10'000'000, kBytesPerRobotState = 26;
 /// Two beside each other fill the page.
 constexpr int kCurveWidth_px = 480, kCurveHeight_px = 300;
 /// Of a larger picture, as of 100,000 robots, the page has a link.
@@ -195,12 +200,16 @@ Plot curve(const std::string& name, const std::string& unit, const std::vector<d
 }
 
 /// Curves over time, or why there are none.
-void add_curves(Data& page, const recorder::RunDirectory& directory) {
+void add_curves(Data& page, const recorder::RunDirectory& directory, std::uint64_t most_robot_states) {
   if (!Gnuplot::installed()) {
     page.set("no_curves", "No curves: gnuplot is not installed. scripts/setup installs it.");
     return;
   }
   recorder::Reader recording(directory.recording());
+  if (fs::file_size(directory.recording()) / kBytesPerRobotState > most_robot_states) {
+    page.set("no_curves", "No curves: the recording is long. kilotwin export RUN --report FILE draws them.");
+    return;
+  }
   const recorder::ObservableCurves curves = recorder::observe(recording);
   if (curves.time_s.size() < 2) {
     page.set("no_curves", "No curves: the recording has fewer than two states.");
@@ -347,14 +356,14 @@ void add_costs(Data& page, const Summary& s) {
   add_federates(page, s);
 }
 
-Facts next_commands(const recorder::RunDirectory& directory, const Summary& s) {
+Facts next_commands(const recorder::RunDirectory& directory, const RunPlan& plan, const Summary& s) {
   const auto in = [&](const char* file) { return shell_word((directory.path() / file).string()); };
   const std::string run = shell_word(directory.path().string());
   Facts next;
   if (!s.failure.empty() && fs::exists(directory.path() / "checkpoints"))
     next.emplace_back("Continue from the last checkpoint",
                       fmt::format("kilotwin run {} --resume {}", in("experiment.txtpb"), run));
-  if (!s.failures.empty())
+  if (!s.failures.empty() && !plan.firmware(s.failures[0].robot))
     next.emplace_back("Debug the first robot that failed",
                       fmt::format("kilotwin debug {} --robot {}", in("experiment.txtpb"), s.failures[0].robot));
   next.emplace_back("Watch it in a browser", "kilotwin view " + run);
@@ -375,9 +384,8 @@ Facts provenance_facts(const Summary& s) {
           {"machine", fmt::format("{}, {} cores", s.provenance.host, s.provenance.cores)}};
 }
 
-}  // namespace
-
-std::string run_report(const recorder::RunDirectory& directory) {
+/// `most_robot_states`: of longer recordings it has no curves.
+std::string page_of(const recorder::RunDirectory& directory, std::uint64_t most_robot_states) {
   const Summary s = recorder::read_summary(directory.summary());
   const RunPlan plan(directory.read_manifest());
   Data page{Data::type::object};
@@ -393,20 +401,31 @@ std::string run_report(const recorder::RunDirectory& directory) {
   }
   if (fs::exists(directory.animation())) page.set("animation", directory.animation().filename().string());
   page.set("settings", settings_of(plan, s));
-  add_curves(page, directory);
+  add_curves(page, directory, most_robot_states);
   add_failures(page, s);
   add_messages(page, s);
   add_station(page, s);
   add_tracking(page, s);
   add_costs(page, s);
-  page.set("next", list_of(next_commands(directory, s), "what", "command"));
+  page.set("next", list_of(next_commands(directory, plan, s), "what", "command"));
   page.set("facts", list_of(provenance_facts(s)));
   page.set("experiment", os::read_file(directory.experiment()));
   return html::page("Kilotwin: run of " + s.name, html::rendered(html::templates::kRun, page));
 }
 
+}  // namespace
+
+std::string run_report(const recorder::RunDirectory& directory) {
+  return page_of(directory, std::numeric_limits<std::uint64_t>::max());
+}
+
 void write_run_report(const recorder::RunDirectory& directory) {
-  if (fs::exists(directory.summary())) os::write_file(directory.report(), run_report(directory));
+  if (!fs::exists(directory.summary())) return;
+  try {
+    os::write_file(directory.report(), page_of(directory, kMostRobotStates));
+  } catch (const std::exception& error) {
+    warn(fmt::format("kilotwin: no report.html: {}", error.what()));
+  }
 }
 
 }  // namespace kilotwin::cli

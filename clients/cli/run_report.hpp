@@ -9,7 +9,8 @@ namespace kilotwin::cli {
 /// no curves, and says so, where gnuplot is not installed. Throws UserError where a file is missing or damaged.
 [[nodiscard]] std::string run_report(const recorder::RunDirectory& directory);
 
-/// Writes it to report.html of the run directory. Does nothing where the run ended before its summary. Throws RunError.
+/// Writes it to report.html of the run directory; without curves if they would take more than some seconds. Does nothing where the
+/// run ended before its summary. A page that cannot be written is a warning: it changes nothing of the run's outcome.
 void write_run_report(const recorder::RunDirectory& directory);
 
 }  // namespace kilotwin::cli

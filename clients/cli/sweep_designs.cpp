@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "clients/cli/text_table.hpp"
 #include "core/csv/csv_writer.hpp"
 
 namespace kilotwin::cli {
@@ -22,11 +23,6 @@ Sample mean_over(const std::map<std::uint64_t, double>& by_seed) {
 std::string number_pair(const Sample& sample) {
   return sample.count() == 0 ? std::string(",")
                              : fmt::format("{:.10g},{:.4g}", sample.mean(), sample.standard_error());
-}
-
-std::string with_error(const Sample& sample) {
-  return sample.count() == 0 ? std::string("-")
-                             : fmt::format("{:.5g} ±{:.2g}", sample.mean(), sample.standard_error());
 }
 
 }  // namespace

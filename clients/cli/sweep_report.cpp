@@ -22,12 +22,6 @@ namespace {
 using recorder::kObservables;
 using recorder::Sample;
 
-std::string with_error(const Sample& sample) {
-  if (sample.count() == 0) return "-";
-  if (sample.count() == 1) return fmt::format("{:.5g}", sample.mean());
-  return fmt::format("{:.5g} ±{:.2g}", sample.mean(), sample.standard_error());
-}
-
 /// Two CSV columns, mean and standard error; both empty without a value.
 std::string csv_pair(const Sample& sample) {
   if (sample.count() == 0) return ",,";

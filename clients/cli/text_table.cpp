@@ -1,9 +1,17 @@
 #include "clients/cli/text_table.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstddef>
 
 namespace kilotwin::cli {
+
+std::string with_error(const recorder::Sample& sample) {
+  if (sample.count() == 0) return "-";
+  if (sample.count() == 1) return fmt::format("{:.5g}", sample.mean());
+  return fmt::format("{:.5g} ±{:.2g}", sample.mean(), sample.standard_error());
+}
 
 std::string aligned(const std::vector<std::vector<std::string>>& rows) {
   const auto width_of = [](const std::string& cell) {

@@ -4,7 +4,12 @@
 #include <string>
 #include <vector>
 
+#include "clients/recorder/statistics.hpp"
+
 namespace kilotwin::cli {
+
+/// "MEAN ±STANDARD ERROR", "MEAN" of a single value, "-" of none.
+[[nodiscard]] std::string with_error(const recorder::Sample&);
 
 /// Formats rows of equal length as columns, the first left-aligned and the others right-aligned. "±" is one character of two bytes.
 [[nodiscard]] std::string aligned(const std::vector<std::vector<std::string>>& rows);

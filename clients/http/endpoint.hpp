@@ -16,7 +16,10 @@ struct Endpoint {
 
   [[nodiscard]] bool encrypted() const { return !certificate.empty(); }
   /// Whether the host is a loopback address, or localhost.
-  [[nodiscard]] bool is_loopback() const { return host == "localhost" || host.starts_with("127."); }
+  [[nodiscard]] bool is_loopback() const {
+    return host == "localhost" ||
+           (host.starts_with("127.") && host.find_first_not_of("0123456789.") == std::string::npos);
+  }
   /// Throws UserError if other machines could connect without TLS; if a file cannot be read; or if the host cannot stand in an
   /// address. It names the options --listen, --certificate and --key of `kilotwin view`.
   void check() const;

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <netdb.h>
 #include <netinet/in.h>
+#include <strings.h>
 
 #include <algorithm>
 #include <array>
@@ -91,7 +92,8 @@ std::string Server::origin() const {
 bool Server::is_named_by(lws* connection) const {
   const std::string host = header_of(connection, WSI_TOKEN_HOST);
   const std::string name = host.substr(0, host.rfind(':'));
-  return name == endpoint_.host || (endpoint_.is_loopback() && (name == "127.0.0.1" || name == "localhost"));
+  return strcasecmp(name.c_str(), endpoint_.host.c_str()) == 0 ||
+         (endpoint_.is_loopback() && (name == "127.0.0.1" || name == "localhost"));
 }
 
 bool Server::is_own_page(lws* connection) const {

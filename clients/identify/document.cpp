@@ -308,14 +308,19 @@ json check_of(const FinalCheck& check) {
 std::string caveats_of(const Findings& f) {
   std::vector<std::string> sentences;
   const double before_mm = f.before.errors.rmse_mm(), after_mm = f.after.errors.rmse_mm();
-  if (after_mm > before_mm * (1 + kSameError))
+  const bool has_effects = !f.found.fit.model.terms.empty();
+  if (has_effects && f.bounds && f.bounds->less_by.high_mm < 0)
     sentences.push_back(fmt::format(
-        "With effects the error on these data is larger than that of the base model ({:.2f} mm, {:.2f} mm): "
-        "they differ from the data of the fit.",
+        "With effects the error on these data is larger than that of the base model ({:.2f} mm, {:.2f} mm), beyond "
+        "chance: they differ from the data of the fit.",
         after_mm, before_mm));
-  if (f.check.chose_on_reported && !f.check.path.empty())
+  if (has_effects && f.check.chose_on_reported)
     sentences.emplace_back(
-        "The same held-out track chose the model and gives its error, so that the error is too small.");
+        "The same held-out tracks chose the model and give its error, so that the error is too small.");
+  if (has_effects && f.check.path.empty())
+    sentences.emplace_back(
+        "No track was left for the last check, so the effects are those of the search alone. More tracks would "
+        "allow it.");
   if (!f.found.limit.empty()) sentences.push_back(f.found.limit);
   return fmt::format("{}", fmt::join(sentences, " "));
 }

@@ -118,9 +118,9 @@ void choose_and_judge(Findings& f, const Fitter& fitter, const MeasuredSet& trai
   const Evaluation choosing(train, nullptr, Tracks::kChoosing, fitter.threads());
   ForecastTimes fast = reported;
   fast.rollouts = 0;
-  if (choosing.judge(f.base, fast).errors.rows > 0) {
+  if (evaluation.of() != Tracks::kHeldOut && choosing.judge(f.base, fast).errors.rows > 0) {
     choose_on_held_out(f, fitter, choosing, reported);
-  } else if (evaluation.of() == Tracks::kReporting && evaluation.judge(f.base, fast).errors.rows > 0) {
+  } else if (evaluation.held_out() != HeldOut::kTestSet && evaluation.judge(f.base, fast).errors.rows > 0) {
     f.check.chose_on_reported = true;
     choose_on_held_out(f, fitter, evaluation, reported);
   }
@@ -132,10 +132,23 @@ void choose_and_judge(Findings& f, const Fitter& fitter, const MeasuredSet& trai
   }
   f.before = evaluation.judge(f.base, reported);
   f.after = evaluation.judge(f.found.fit, reported);
+  // A model that diverges gives no prediction for some rows.
+  if (f.after.forecasts.size() != f.before.forecasts.size()) {
+    keep_base_model(f);
+    f.after = f.before;
+  }
   if (gives_errors(f.held_out) && f.before.errors.rows == 0) f.held_out = HeldOut::kNoTime;
   if (!gives_errors(f.held_out)) return;
   for (std::size_t t = 0; t < f.found.fit.model.terms.size(); ++t)
     f.rmse_without_mm.push_back(evaluation.judge(without_term(fitter, f.found.fit, t), reported).errors.rmse_mm());
+}
+
+/// The held-out tracks that give the error: those that do not choose, or all if none of them is measured at a predicted time.
+Tracks reporting_tracks(const MeasuredSet& train, const MeasuredSet* test, const FitState& base,
+                        const ForecastTimes& times, std::uint32_t threads) {
+  if (test != nullptr) return Tracks::kAll;
+  const Evaluation reporting(train, nullptr, Tracks::kReporting, threads);
+  return reporting.judge(base, times).errors.rows > 0 ? Tracks::kReporting : Tracks::kHeldOut;
 }
 
 }  // namespace
@@ -148,7 +161,6 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   FitState base(train);
   if (base.tracks.units().empty())
     throw UserError("no track of the training runs has two samples; give longer tracks");
-  const Evaluation evaluation(train, test, Tracks::kReporting, options.threads);
   const ForecastTimes times{10, 5, options.horizon_s};
   ForecastTimes reported = times;
   reported.rollouts = kRollouts;
@@ -156,6 +168,8 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   say_progress(0.02, "base model");
   const Fitter fitter(train, options.threads);
   fitter.fit_base(base);
+  const Evaluation evaluation(train, test, reporting_tracks(train, test, base, times, options.threads),
+                              options.threads);
   Findings f{base, found_by_search(fitter, base, train, times, options)};
   f.held_out = evaluation.held_out();
   f.model_file = options.model_file;

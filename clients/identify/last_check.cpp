@@ -11,6 +11,9 @@
 namespace kilotwin::identify {
 namespace {
 
+/// A term that lowers the error by this share stays, whatever the sign of an uncertain gain in likelihood.
+constexpr double kClearError = 0.02;
+
 bool on_measurement(const Term& term) { return is_measured(term.blocks.front().target); }
 
 void take_out(Search& found, std::size_t t, FitState without) {
@@ -41,6 +44,11 @@ bool holds(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
+/// The error of a model on the tracks that choose; infinite if it fails to predict rows that the base model predicts.
+double error_mm(const Judged& judged, std::size_t rows) {
+  return judged.errors.rows == rows ? judged.errors.rmse_mm() : INFINITY;
+}
+
 /// Everything about dropped effects leaves the findings, except that they were dropped.
 void note_dropped(Findings& f, const Stage& last) {
   const std::vector<std::string> kept = effects_of(f.found.fit.model);
@@ -67,12 +75,15 @@ struct Trial {
 Trial trial_of(const Fitter& fitter, const FitState& fit, std::size_t t, const Evaluation& choosing,
                const ForecastTimes& times, const Judged& with) {
   FitState without = without_term(fitter, fit, t);
-  const double with_mm = with.errors.rmse_mm(), without_mm = choosing.judge(without, times).errors.rmse_mm();
+  const double with_mm = with.errors.rmse_mm();
+  const double without_mm = error_mm(choosing.judge(without, times), with.errors.rows);
   const HeldOutGain gain = held_out_gain(fit.model, without.model, with.tracks, choosing.of(), fitter.threads());
   // Effects of the measurement hardly change predicted positions. They must not raise the error.
   const double least_mm = with_mm * (on_measurement(fit.model.terms[t]) ? 1 - kSameError : 1 + kSameError);
-  // Negated, so that a gain that is no number does not pass.
-  return {std::move(without), gain, !(gain.nat >= 0) || without_mm <= least_mm};
+  // A likelihood of few tracks has a large error of its own. Negated, so that a gain that is no number does not pass.
+  const bool is_unlikely =
+      !(gain.nat + 2 * gain.nat_se >= 0) || (gain.nat < 0 && !(without_mm > with_mm * (1 + kClearError)));
+  return {std::move(without), gain, is_unlikely || without_mm <= least_mm};
 }
 
 /// Takes out terms one at a time: of those that do not help the one with the least gain.
@@ -122,25 +133,38 @@ void keep_predictive_terms(const Fitter& fitter, const MeasuredSet& train, const
 
 void choose_on_held_out(Findings& f, const Fitter& fitter, const Evaluation& choosing, const ForecastTimes& times) {
   const std::vector<Stage> path = path_to(f.found);
+  const std::size_t rows = choosing.judge(path.front().fit, times).errors.rows;
   std::vector<Candidate> candidates;
   for (const Stage& stage : path) {
     const std::vector<Term>& terms = stage.fit.model.terms;
     const auto moving = std::count_if(terms.begin(), terms.end(), [](const Term& t) { return !on_measurement(t); });
-    candidates.push_back({static_cast<std::size_t>(moving), choosing.judge(stage.fit, times).errors.rmse_mm()});
+    candidates.push_back({static_cast<std::size_t>(moving), error_mm(choosing.judge(stage.fit, times), rows)});
     f.check.path.push_back({effects_of(stage.fit.model), candidates.back().rmse_mm});
   }
   f.check.kept = smallest_of_the_best(candidates);
   f.found.fit = path[f.check.kept].fit;
   f.found.reasons = path[f.check.kept].reasons;
   take_out_useless(f, fitter, choosing, times);
+  const MotionModel &left = f.found.fit.model, &base = path.front().fit.model;
+  const bool is_base = left.terms.empty() && left.base.command_lag_s == base.base.command_lag_s;
   // Negated, so that an error that is no number does not pass.
-  if (!(choosing.judge(f.found.fit, times).errors.rmse_mm() <= candidates.front().rmse_mm * (1 + kSameError))) {
+  if (is_base ||
+      !(error_mm(choosing.judge(f.found.fit, times), rows) <= candidates.front().rmse_mm * (1 + kSameError))) {
     f.found.fit = path.front().fit;
     f.found.reasons.clear();
     f.check.gains.clear();
     f.check.kept = 0;
   }
   note_dropped(f, path.back());
+}
+
+void keep_base_model(Findings& f) {
+  const Stage last{f.found.fit, f.found.reasons};
+  f.found.fit = f.base;
+  f.found.reasons.clear();
+  f.check.gains.clear();
+  f.check.kept = 0;
+  note_dropped(f, last);
 }
 
 }  // namespace kilotwin::identify

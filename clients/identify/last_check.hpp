@@ -14,10 +14,13 @@ void keep_predictive_terms(const Fitter&, const MeasuredSet& train, const Foreca
 
 /// Sets `fit`, `reasons` and `check` of the findings, and keeps of the findings only what concerns terms of this model:
 ///   - of the models on the path of the search the smallest whose error is within 0.1 % of the least (final_check.hpp);
-///   - then takes out, one at a time, terms whose gain in log likelihood is negative, and terms without which the error is
-///     no larger;
+///   - then takes out, one at a time, terms whose gain in log likelihood is negative beyond two standard errors; terms whose
+///     gain is negative and which do not lower the error clearly; and terms without which the error is no larger;
 ///   - the base model, if the result predicts worse than it.
 void choose_on_held_out(Findings&, const Fitter&, const Evaluation& choosing, const ForecastTimes&);
+
+/// Writes the base model in place of what was found.
+void keep_base_model(Findings&);
 
 /// A model without one of its terms, refitted.
 [[nodiscard]] FitState without_term(const Fitter&, const FitState&, std::size_t term);

@@ -97,7 +97,10 @@ class RealController {
     while (interrupted() == 0) {
       watch_run();
       for (const auto until = Clock::now() + kLook; Clock::now() < until && interrupted() == 0;) {
-        if (const auto packet = station_.take(until)) forward(*packet);
+        const auto packet = station_.take(until);
+        if (!packet) continue;
+        forward(*packet);
+        lived_ = true;  // STOP must follow, also if the run ends before the next look
       }
       if (!guard_.runs()) take_over();
     }

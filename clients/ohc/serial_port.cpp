@@ -13,6 +13,7 @@
 
 #include "core/base/say.hpp"
 #include "core/os/files.hpp"
+#include "core/os/interrupt.hpp"
 
 namespace kilotwin::ohc {
 namespace {
@@ -156,7 +157,7 @@ bool send_packet(int socket, const OverheadPacket& packet) {
   ssize_t count = 0;
   do {
     count = recv(socket, &done, sizeof done, 0);
-  } while (count < 0 && errno == EINTR);
+  } while (count < 0 && errno == EINTR && interrupted() == 0);
   return count > 0;
 }
 

@@ -234,7 +234,7 @@ void read_further_fields(const Json& json, Summary& s) {
   s.cpu_s = json.value("cpu_s", 0.0);
   s.peak_memory_mib = json.value("peak_memory_mib", 0.0);
   s.failure = json.value("failure", "");
-  s.per_robot = per_robot_of(json.value("messages_per_robot", none), s.robots);
+  if (json.contains("messages_per_robot")) s.per_robot = per_robot_of(json.at("messages_per_robot"), s.robots);
   s.failures = failures_of(json.value("failures", Json::array()));
   if (const auto observables = json.find("observables"); observables != json.end()) {
     for (const auto& [name, value] : observables->items())
@@ -315,6 +315,7 @@ void write_summary(const Summary& s, const std::filesystem::path& file) {
     json["worst_lateness_ms"] = s.lateness.worst_s * 1e3;
   }
   if (s.tracked) json["tracking"] = tracking_json(s.tracking);
+  if (s.per_robot.robots == 0) json.erase("messages_per_robot");
   if (!s.monitor.empty()) json["monitor"] = Json::parse(s.monitor);
   os::write_file(file, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }

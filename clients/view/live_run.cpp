@@ -180,9 +180,9 @@ void LiveRun::begin(Gateway& gateway) {
     if (plan) outline.ghost_margin_mm = ghost_margin_mm(*plan);
     const std::string text = run_text(outline, *facts.experiment);
     grid_ = grid_of(*facts.experiment);
-    run_ = facts.run;
     {
       const std::lock_guard lock(mutex_);
+      run_ = facts.run;
       recording_.reset();
       plan_ = plan;
       frames_.clear();

@@ -40,11 +40,11 @@ std::vector<Directive> ExternalInput::take() {
   return std::exchange(waiting_, {});
 }
 
-bool ExternalInput::is_new(const std::string& client, std::uint32_t request) {
-  const auto [entry, inserted] = last_request_.try_emplace(client, request);
-  if (!inserted && entry->second == request) return false;
-  entry->second = request;
-  return true;
+void ExternalInput::note(const std::string& client, std::uint32_t request) {
+  if (last_request_.insert_or_assign(client, request).second) clients_.push_back(client);
+  if (clients_.size() <= kMostClients) return;
+  last_request_.erase(clients_.front());
+  clients_.pop_front();
 }
 
 template <class Sample, class Make>
@@ -55,14 +55,17 @@ void ExternalInput::receive(const std::string& topic, const Sample& sample, Make
     const std::lock_guard lock(mutex_);
     const std::string client = topic + ' ' + sample.client;
     if (!ours(sample.run)) return;
-    if (last_request_.size() == kMostClients && last_request_.count(client) == 0) {
-      refusal = fmt::format("more than {} clients send requests", kMostClients);
-    } else if (!is_new(client, sample.request)) {
+    if (const auto last = last_request_.find(client); last != last_request_.end() && last->second == sample.request)
       return;
-    } else if (waiting_.size() == kMostWaiting) {
+    const std::optional<Directive> directive = make(refusal);
+    // However many requests wait, a run can be paused and stopped.
+    const bool is_urgent =
+        directive && (directive->kind == DirectiveKind::kPause || directive->kind == DirectiveKind::kStop);
+    if (directive && waiting_.size() >= kMostWaiting && !is_urgent) {
       refusal = fmt::format("{} requests wait already", kMostWaiting);
-    } else if (const std::optional<Directive> directive = make(refusal)) {
-      waiting_.push_back(*directive);
+    } else {
+      note(client, sample.request);
+      if (directive) waiting_.push_back(*directive);
     }
     if (!refusal.empty()) withheld = limit_.pass(LineLimit::Clock::now());
   }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <chrono>
+#include <deque>
 #include <map>
 #include <mutex>
 #include <string>
@@ -29,13 +30,14 @@ class ExternalInput {
   void on_overhead_packet(const PublicOverheadPacket&);
   void on_relocation(const PublicRelocation&);
   [[nodiscard]] bool ours(std::uint64_t run) const { return run == 0 || run == plan_.run(); }
-  /// False where the client's request was seen before; with the mutex held.
-  bool is_new(const std::string& client, std::uint32_t request);
+  /// Remembers the client's last request, with the mutex held. Of more than kMostClients, the oldest are forgotten.
+  void note(const std::string& client, std::uint32_t request);
 
   const RunPlan& plan_;
   std::mutex mutex_;
   std::vector<Directive> waiting_;
   std::map<std::string, std::uint32_t> last_request_;  // per topic and client
+  std::deque<std::string> clients_;                    // the keys of last_request_, by age
   LineLimit limit_{std::chrono::seconds(1)};
   dds::Reader<PublicRunControl> run_control_;
   dds::Reader<PublicOverheadPacket> overhead_packets_;

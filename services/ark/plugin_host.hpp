@@ -18,10 +18,11 @@ class PluginHost {
   [[nodiscard]] virtual station::Reply ask(const station::Request& request) = 0;
 };
 
-/// The time that a call of a plugin may take: processor time of its process, and wall time for one that waits for ever.
+/// The time that a call of a plugin may take: processor time of its process, and wall time for one that waits for ever. Calls
+/// of a step have a wall time of their own: in a run at a pace, real robots drive on meanwhile.
 struct PluginPatience {
-  double cpu_s = 2, wall_s = 60;
-  static constexpr double kPacedWall_s = 2;  ///< of a run at a pace
+  double cpu_s = 2, wall_s = 60, step_wall_s = 60;
+  static constexpr double kPacedStep_s = 2;  ///< step_wall_s of a run at a pace
 };
 
 /// Throws UserError where the run directory lacks the plugin's object, or there is no built-in plugin of the name.

@@ -47,7 +47,7 @@ class PluginProcess final : public PluginHost {
     station::Archive archive;
     station::Request copy = request;
     copy.serialize(archive);
-    begin_call();
+    begin_call(request.call);
     const auto size = static_cast<std::uint32_t>(archive.octets().size());
     std::string octets(sizeof size, '\0');
     std::memcpy(octets.data(), &size, sizeof size);
@@ -79,7 +79,8 @@ class PluginProcess final : public PluginHost {
     return reply;
   }
 
-  void begin_call() {
+  void begin_call(station::Call call) {
+    most_wall_s_ = call == station::Call::kStep ? patience_.step_wall_s : patience_.wall_s;
     begun_ = Clock::now();
     cpu_begun_s_ = cpu_s();
   }
@@ -91,7 +92,7 @@ class PluginProcess final : public PluginHost {
   }
   [[nodiscard]] bool is_too_long() const {
     return cpu_s() - cpu_begun_s_ > patience_.cpu_s ||
-           std::chrono::duration<double>(Clock::now() - begun_).count() > patience_.wall_s;
+           std::chrono::duration<double>(Clock::now() - begun_).count() > most_wall_s_;
   }
 
   [[nodiscard]] bool send_all(const std::string& octets) {
@@ -187,6 +188,7 @@ class PluginProcess final : public PluginHost {
   }
 
   const PluginPatience patience_;
+  double most_wall_s_ = 0;        // of the present call
   os::Descriptor ours_, theirs_;  // before process_, whose start uses them
   os::Process process_;
   Clock::time_point begun_{};

@@ -22,6 +22,9 @@ void StationEngine::save(proto::StationState& state) const {
   for (std::size_t robot = 0; !camera_ && robot < plan_.robots(); ++robot) {
     state.add_seen_mm(seen_.x_mm[robot]);
     state.add_seen_mm(seen_.y_mm[robot]);
+    for (const double value : {seen_.vx_mm[robot], seen_.vy_mm[robot], seen_.heading_rad[robot]})
+      state.add_seen_motion(value);
+    state.mutable_seen_led()->push_back(static_cast<char>(seen_.led[robot]));
     state.mutable_seen()->push_back(static_cast<char>(seen_.seen[robot]));
   }
   for (const Plugin& plugin : plugins_) {
@@ -66,12 +69,18 @@ void StationEngine::load(Tick tick, std::span<const proto::StationState* const> 
   outputs_of_set_up_.clear();
   if (camera_) camera_->load(state.camera());
   if (!camera_) {
-    if (static_cast<std::size_t>(state.seen_mm_size()) != 2 * std::size_t{plan_.robots()} ||
-        state.seen().size() != plan_.robots())
+    const std::size_t robots = plan_.robots();
+    if (static_cast<std::size_t>(state.seen_mm_size()) != 2 * robots || state.seen().size() != robots ||
+        static_cast<std::size_t>(state.seen_motion_size()) != 3 * robots || state.seen_led().size() != robots)
       throw RunError("the checkpoint holds no station's state of this experiment");
     for (std::uint32_t robot = 0; robot < plan_.robots(); ++robot) {
       seen_.x_mm[robot] = state.seen_mm(static_cast<int>(2 * robot));
       seen_.y_mm[robot] = state.seen_mm(static_cast<int>(2 * robot + 1));
+      const auto motion = [&](std::uint32_t n) { return state.seen_motion(static_cast<int>(3 * robot + n)); };
+      seen_.vx_mm[robot] = motion(0);
+      seen_.vy_mm[robot] = motion(1);
+      seen_.heading_rad[robot] = motion(2);
+      seen_.led[robot] = static_cast<LedClass>(state.seen_led()[robot]);
       seen_.seen[robot] = state.seen()[robot] != 0 ? 1 : 0;
     }
   }

@@ -57,7 +57,7 @@ std::int64_t cycles_of(double seconds) {
 /// A paced run cannot stand still for a plugin: real robots drive on.
 PluginPatience patience_of(const RunPlan& plan) {
   PluginPatience patience;
-  if (plan.pace > 0) patience.wall_s = PluginPatience::kPacedWall_s;
+  if (plan.pace > 0) patience.step_wall_s = PluginPatience::kPacedStep_s;
   return patience;
 }
 

@@ -317,6 +317,8 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
   if (!eventful && memory.get<std::uint8_t>(program, program.file.table.robot + offsetof(KtRobot, parked)) != 0) {
     const auto ticks = memory.get<std::uint32_t>(program, program.file.table.ticks);
     memory.set(program, program.file.table.ticks, ticks + kilo_ticks);
+    // It may have parked in the tick of a flash, whose colour led_ then shows.
+    led_[i] = memory.get<std::uint8_t>(program, program.file.table.robot + offsetof(KtRobot, led)) & 63;
     return;
   }
 

@@ -134,6 +134,18 @@ class Package(unittest.TestCase):
             kilotwin.sweep(self.out / "e.txtpb", out=self.out / "sweep", seeds="1..2")
         self.assertEqual(len(kilotwin.Sweep(self.out / "sweep").table()), 2)
 
+    def test_a_run_without_a_directory_says_where_it_is(self):
+        before = os.getcwd()
+        os.chdir(self.out)
+        try:
+            first = kilotwin.run(EXPERIMENT, robots=4, duration_s=1)
+            second = kilotwin.run(EXPERIMENT, robots=4, duration_s=1)
+        finally:
+            os.chdir(before)
+        self.assertNotEqual(first.directory, second.directory)
+        for run in (first, second):
+            self.assertTrue((self.out / run.directory / "report.html").exists())
+
     def test_errors_are_exceptions(self):
         with self.assertRaisesRegex(kilotwin.KilotwinError, "cannot be read|no such|does not exist") as raised:
             kilotwin.run(self.out / "none.txtpb")
@@ -319,8 +331,8 @@ class Package(unittest.TestCase):
         self.assertFalse((self.out / "no").exists())
 
     def test_it_installs_without_a_network(self):
-        if importlib.util.find_spec("ensurepip") is None or importlib.util.find_spec("setuptools") is None:
-            self.skipTest("python3-venv or python3-setuptools is not installed")
+        if importlib.util.find_spec("ensurepip") is None or any(importlib.util.find_spec(name) is None for name in ("setuptools", "wheel")):
+            self.skipTest("python3-venv, python3-setuptools or python3-wheel is not installed")
         # A build leaves files beside its sources.
         shutil.copytree(SOURCES / "python", self.out / "python")
         subprocess.run([sys.executable, "-m", "venv", "--system-site-packages", self.out / "venv"], check=True)

@@ -201,6 +201,7 @@ int identify_data(const IdentifyArguments& arguments) {
   }
 
   progress->show(0.97, "drawing the report", "drawing");
+  clamp_to_ranges(found.model);
   os::write_file(options.model_file,
                  identify::text_of(found.model, fmt::format("Identified from {}.", arguments.train.string())));
   write_draws(found.draws, arguments.train, out / "draws");

@@ -331,7 +331,7 @@ nlohmann::json document_of(const std::vector<DataFault>& faults) {
                    {"from_s", f.from_s},
                    {"to_s", f.to_s},
                    {"strength", f.strength},
-                   {"excluded", f.excluded},
+                   {"excluded", f.of_test ? 0 : f.excluded},
                    {"in_words", f.in_words()}});
   }
   return all;

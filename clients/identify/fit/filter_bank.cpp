@@ -62,7 +62,8 @@ void FilterBank::prune() {
     if (std::isfinite(h.log_weight)) best = std::max(best, h.log_weight);
   const bool any = best > -1e300;
   for (Hypothesis& h : hypotheses_) h.log_weight = any ? h.log_weight - best : 0;
-  std::erase_if(hypotheses_, [](const Hypothesis& h) { return !(h.log_weight >= -kHopeless); });
+  std::erase_if(hypotheses_,
+                [](const Hypothesis& h) { return !std::isfinite(h.log_weight) || h.log_weight < -kHopeless; });
   // Merges hypotheses that have converged to the same heading.
   for (std::size_t i = 0; i + 1 < hypotheses_.size(); ++i) {
     for (std::size_t j = i + 1; j < hypotheses_.size();) {

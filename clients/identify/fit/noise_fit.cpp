@@ -283,11 +283,11 @@ Noise most_likely_noise(const MotionModel& start, const std::vector<const TrackV
     constexpr double kNone_mm2 = 0.01, kNone_s = 1e-5;
     if (std::exp(at[kPosition]) < kNone_mm2 || std::exp(at[kFactor]) < kNone_s) {
       const NoiseVector middle = logs_of(Noise{});
-      NoiseVector start = at;
-      start[kFactor] = std::max(at[kFactor], middle[kFactor]);
-      start[kDrift] = std::min(at[kDrift], std::log(1e-2));
-      start[kPosition] = std::max(at[kPosition], std::log(0.1));
-      if (climb(start) > value) at = start;
+      NoiseVector restart = at;
+      restart[kFactor] = std::max(at[kFactor], middle[kFactor]);
+      restart[kDrift] = std::min(at[kDrift], std::log(1e-2));
+      restart[kPosition] = std::max(at[kPosition], std::log(0.1));
+      if (climb(restart) > value) at = restart;
     }
     model.noise = with(model.noise, variances(at));
     if ((at - before).cwiseAbs().maxCoeff() < kSettled) break;

@@ -47,7 +47,7 @@ std::string in_words(HeldOut held_out) {
     case HeldOut::kTestSet:
       return "Errors refer to the data of --test, which took no part in the fit or in the choice of the model.";
     case HeldOut::kRuns: return "Errors refer to tracks of the last runs, which took no part in the fit.";
-    case HeldOut::kRobots: return "Errors refer to one robot in four, which took no part in the fit.";
+    case HeldOut::kRobots: return "Errors refer to robots that took no part in the fit.";
     case HeldOut::kNoTime:
       return "No held-out track was measured both at a predicted time (10, 15, 20... s) and before, so the "
              "prediction "

@@ -24,7 +24,7 @@ enum class HeldOut : std::uint8_t { kTestSet, kRuns, kRobots, kNothing, kNoTime 
 /// up to three robots is fitted whole. Every other held-out robot (or run, or track) chooses among the models of the search,
 /// the others give the reported error. A single held-out track does not choose.
 void hold_out_part(MeasuredSet&);
-/// Beside a test set: holds out one track in five, which chooses. With two runs or more each robot keeps tracks in the fit.
+/// Beside a test set: holds out one track in five, which chooses. Robots that take part in two runs or more keep tracks in the fit.
 /// Less than five tracks are fitted whole.
 void hold_out_for_choice(MeasuredSet&);
 

@@ -138,11 +138,11 @@ std::string words_of(const Pattern& p) {
 
 /// How the error compares with what the model expects of itself, where no gap is beyond its uncertainty.
 std::string comparison_in_words(const Unexplained& u, const std::optional<ErrorBounds>& bounds) {
-  if (u.error_mm == 0) return "Nothing is held out, so that the error is not compared with what the model expects.";
+  if (u.error_mm == 0) return "No held-out data give an error that could be compared with what the model expects.";
   if (!bounds)
     return "There is one held-out track only, so that the error is not compared with what the model expects.";
   if (u.expected_mm > 0 && u.error_mm <= kBeyond * u.expected_mm)
-    return fmt::format("The error of {:.2f} mm is within what the model expects ({:.2f} mm).", u.error_mm,
+    return fmt::format("The error of {:.2f} mm is near what the model expects ({:.2f} mm).", u.error_mm,
                        u.expected_mm);
   return fmt::format(
       "The error of {:.2f} mm exceeds the {:.2f} mm that the model expects, but too few data are held out to be "

@@ -125,10 +125,12 @@ def run(
     words += common_words(robots=robots, behaviour=behaviour, duration_s=duration_s, model=model, define=define, out=out, force=force)
     if strict:
         words.append("--strict")
+    if out is not None:
+        words.append("--quiet")  # nobody reads what it would print, nor its page
     printed = call(words)
     if out is not None:
         return Run(out)
-    place = re.search(r"^\s*results\s+(\S.*?)(?: \(.* holds an earlier result.*\))?: summary\.json", printed, re.MULTILINE)
+    place = re.search(r"^\s*results\s+(\S.*?)(?: \(.* holds an earlier result.*\))?: report\.html, summary\.json", printed, re.MULTILINE)
     if place is None:
         raise RuntimeError("kilotwin did not say where the results are")
     return Run(place.group(1))

@@ -255,21 +255,21 @@ static int32_t rand_state = 1, random_state = 1;
 int rand(void) { return (int)((uint32_t)next_random(&rand_state) % ((uint32_t)RAND_MAX + 1)); }
 void srand(unsigned seed) { rand_state = (int32_t)(uint16_t)seed; }
 
-int rand_r(uint32_t* state) {
-  int32_t x = (int32_t)*state;
+/* Of a caller's state the low 32 bits: an unsigned long of a program with the robot's int has no more. */
+static uint32_t next_of(unsigned long* state) {
+  int32_t x;
+  memcpy(&x, state, sizeof x);
   next_random(&x);
-  *state = (uint32_t)x;
-  return (int)((uint32_t)x % ((uint32_t)RAND_MAX + 1));
+  memcpy(state, &x, sizeof x);
+  return (uint32_t)x;
 }
+
+int rand_r(unsigned long* state) { return (int)(next_of(state) % ((uint32_t)RAND_MAX + 1)); }
 
 long random(void) { return (long)((uint32_t)next_random(&random_state) % ((uint32_t)RANDOM_MAX + 1)); }
 void srandom(unsigned long seed) { random_state = (int32_t)seed; }
 
-long random_r(uint32_t* state) {
-  int32_t x = (int32_t)*state;
-  next_random(&x);
-  return (long)(*state = (uint32_t)x);
-}
+long random_r(unsigned long* state) { return (long)next_of(state); }
 
 /* Insertion sort: stable, small, and fast enough for a robot's few elements. Comparators return the robot's int, 16 bits. */
 void qsort(void* base, size_t count, size_t size, int (*compare)(const void*, const void*)) {

@@ -154,7 +154,7 @@ TEST(Unexplained, SaysWhatWasComparedAndWhatWasNot) {
   EXPECT_TRUE(says(nothing, "Nothing is held out")) << nothing;
   const std::string within =
       words(sets.held_out, errors_by_track(sets.held_out, 4.2), ErrorBounds{{3, 6}, {3, 6}, {-1, 1}, 12, 2});
-  EXPECT_TRUE(says(within, "is within what the model expects")) << within;
+  EXPECT_TRUE(says(within, "is near what the model expects")) << within;
   for (const std::string& text : {unsure, one_track, nothing})
     EXPECT_FALSE(says(text, "within what the model expects")) << text;
 }

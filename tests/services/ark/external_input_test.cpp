@@ -56,6 +56,19 @@ TEST_F(ExternalInputs, ARequestCountsOnceAndInOrder) {
   EXPECT_EQ(take_until(13), (std::vector<double>{10, 12, 13}));
 }
 
+/// Each command of a shell is a client of its own.
+TEST_F(ExternalInputs, AClientIsHeardHoweverManyCameBefore) {
+  for (std::uint32_t i = 0; i < 1100; ++i) {
+    request("client " + std::to_string(i), 1, 10);
+    if (i % 10 == 9) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));  // the reader keeps 16
+      static_cast<void>(input_.take());
+    }
+  }
+  request("the last", 1, 20);
+  EXPECT_EQ(take_until(20).back(), 20);
+}
+
 /// A client's name may hold anything, and refused requests may come as fast as the network carries them.
 TEST_F(ExternalInputs, AStrangerCannotForgeOrFloodTheLog) {
   ::testing::internal::CaptureStderr();

@@ -45,11 +45,16 @@ char* ultoa(unsigned long value, char* to, int base);
 char* dtostrf(double value, signed char width, unsigned char decimals, char* to);
 int rand(void);
 void srand(unsigned seed);
-/* The robot's unsigned long has 32 bits. */
+/* The robot's unsigned long has 32 bits. Both functions use no more. */
+#ifdef KILOTWIN_ROBOT_INT
 int rand_r(unsigned int* state);
+long random_r(unsigned int* state);
+#else
+int rand_r(unsigned long* state);
+long random_r(unsigned long* state);
+#endif
 long random(void);
 void srandom(unsigned long seed);
-long random_r(unsigned int* state);
 void qsort(void* base, size_t count, size_t size, int (*compare)(const void*, const void*));
 void* bsearch(const void* key, const void* base, size_t count, size_t size,
               int (*compare)(const void*, const void*));
