@@ -14,7 +14,7 @@ namespace kilotwin::test {
 namespace {
 
 /// Every robot shows what it should: variables that are known functions of its id and of the number of its loops.
-constexpr const char* kProgram = R"(
+constexpr const char* kCountingProgram = R"(
 #include <kilolib.h>
 uint16_t beats;
 int16_t scores[3];
@@ -34,7 +34,7 @@ void loop(void) { ++beats; state.level = kilo_uid * 0.5f + beats;
 int main(void) { kilo_init(); kilo_message_tx = tx; kilo_start(setup, loop); return 0; }
 )";
 
-constexpr const char* kExperiment = R"(
+constexpr const char* kCountingExperiment = R"(
 name: "observed"
 duration_s: 5
 arena { width_mm: 600 height_mm: 600 }
@@ -80,9 +80,9 @@ Table table_of(const std::string& csv) {
 class Observations : public testing::Test {
  protected:
   Observations() {
-    write(scratch_.path() / "observed.c", kProgram);
-    write(scratch_.path() / "plain.txtpb", kExperiment);
-    write(scratch_.path() / "observed.txtpb", std::string(kExperiment) + kRecording);
+    write(scratch_.path() / "observed.c", kCountingProgram);
+    write(scratch_.path() / "plain.txtpb", kCountingExperiment);
+    write(scratch_.path() / "observed.txtpb", std::string(kCountingExperiment) + kRecording);
   }
   std::string exported(const std::string& run, const std::string& what) {
     const Outcome outcome = kilotwin({"export", scratch_ / run, what, "-"}, scratch_);
@@ -275,7 +275,7 @@ TEST_F(Observations, MistakesAreNamedWithTheirPlace) {
       {"observable { name: \"a b\" value: \"1\" }", "no name"},
   };
   for (const auto& [text, what] : cases) {
-    write(scratch_.path() / "wrong.txtpb", std::string(kExperiment) + text);
+    write(scratch_.path() / "wrong.txtpb", std::string(kCountingExperiment) + text);
     const Outcome outcome = kilotwin({"check", scratch_ / "wrong.txtpb"}, scratch_);
     EXPECT_EQ(outcome.status, 2) << text;
     EXPECT_NE(outcome.err.find("wrong.txtpb:6:"), std::string::npos) << outcome.err;
@@ -285,7 +285,7 @@ TEST_F(Observations, MistakesAreNamedWithTheirPlace) {
 
 TEST_F(Observations, FirmwareRobotsHaveVariablesToo) {
   write(scratch_.path() / "avr.txtpb",
-        std::string(kExperiment) +
+        std::string(kCountingExperiment) +
             "robots { count: 2 avr: true behaviour: \"observed.c\" first_uid: 20 layout { x_mm: 200 "
             "y_mm: 200 grid { pitch_mm: 50 } } }" +
             kRecording);
