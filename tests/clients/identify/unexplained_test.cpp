@@ -151,7 +151,7 @@ TEST(Unexplained, SaysWhatWasComparedAndWhatWasNot) {
   const std::string one_track = words(sets.held_out, errors, {});
   EXPECT_TRUE(says(one_track, "one held-out track only")) << one_track;
   const std::string nothing = words({}, {}, {});
-  EXPECT_TRUE(says(nothing, "Nothing is held out")) << nothing;
+  EXPECT_TRUE(says(nothing, "No held-out data give an error")) << nothing;
   const std::string within =
       words(sets.held_out, errors_by_track(sets.held_out, 4.2), ErrorBounds{{3, 6}, {3, 6}, {-1, 1}, 12, 2});
   EXPECT_TRUE(says(within, "is near what the model expects")) << within;
