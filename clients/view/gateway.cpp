@@ -21,6 +21,7 @@ namespace kilotwin::view {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+double steady_s() { return std::chrono::duration<double>(Clock::now().time_since_epoch()).count(); }
 
 /// Bytes of a file that are handed to the library at once.
 constexpr std::size_t kChunk_bytes = 65536;
@@ -116,8 +117,9 @@ bool equal_tokens(std::string_view a, std::string_view b) {
 
 class Gateway::Service {
  public:
-  Service(const http::Endpoint& endpoint, std::string token, PageFiles page)
-      : token_(std::move(token)),
+  Service(const http::Endpoint& endpoint, std::string token, PageFiles page, Clock_s clock)
+      : clock_(clock ? std::move(clock) : steady_s),
+        token_(std::move(token)),
         page_(std::move(page)),
         server_(
             endpoint, wanted(this),
@@ -375,10 +377,10 @@ class Gateway::Service {
     const std::lock_guard lock(answering_);
     if (answers_ == nullptr) return;
     serving_s_ = next->served_s;
-    const auto began = Clock::now();
+    const double began_s = clock_();
     answer_in_line(*next);
     if (next->lines.empty()) answer_with_frame(*next);
-    next->served_s += std::chrono::duration<double>(Clock::now() - began).count();
+    next->served_s += clock_() - began_s;
   }
 
   /// Turns requests into lines, until one has an answer. With answering_ held.
@@ -426,6 +428,7 @@ class Gateway::Service {
     if (!frame.empty()) viewer.answered_frame = std::make_shared<const std::string>(std::move(frame));
   }
 
+  const Clock_s clock_;
   const std::string token_;
   const PageFiles page_;
   std::atomic<std::uint32_t> viewers_{0};
@@ -439,8 +442,8 @@ class Gateway::Service {
   http::Server server_;
 };
 
-Gateway::Gateway(const http::Endpoint& endpoint, std::string token, PageFiles page)
-    : service_(std::make_unique<Service>(endpoint, std::move(token), std::move(page))) {}
+Gateway::Gateway(const http::Endpoint& endpoint, std::string token, PageFiles page, Clock_s clock)
+    : service_(std::make_unique<Service>(endpoint, std::move(token), std::move(page), std::move(clock))) {}
 Gateway::~Gateway() = default;
 std::uint16_t Gateway::port() const { return service_->port(); }
 std::string Gateway::address() const { return service_->address(); }

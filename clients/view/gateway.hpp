@@ -13,6 +13,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -61,8 +62,12 @@ class Gateway {
     std::uint64_t frames = 0, bytes = 0, refused = 0;  ///< since the start; refused: connections and broken rules
   };
 
-  /// Serves from a thread of its own. `token`: 16 characters or more. Throws UserError where the endpoint cannot be served.
-  Gateway(const http::Endpoint& endpoint, std::string token, PageFiles page);
+  /// Tells the time by which answers are counted, in seconds since any moment. Called from the gateway's thread.
+  using Clock_s = std::function<double()>;
+
+  /// Serves from a thread of its own. `token`: 16 characters or more. Without a clock, the steady one of the system counts.
+  /// Throws UserError where the endpoint cannot be served.
+  Gateway(const http::Endpoint& endpoint, std::string token, PageFiles page, Clock_s clock = {});
   ~Gateway();
   Gateway(const Gateway&) = delete;
 

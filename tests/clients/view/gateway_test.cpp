@@ -3,11 +3,12 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <cstring>
 #include <fstream>
 #include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <thread>
@@ -44,16 +45,52 @@ class NotedRun : public RecordedRun {
   std::vector<Request::Kind> steered;  // of the gateway's thread; read it after an answer
 };
 
-/// A recording whose plots take long.
-class SlowRun : public NotedRun {
+/// A recording whose plots take long, by a clock of its own, and until the test lets them go on.
+class HeldRun : public NotedRun {
  public:
   using NotedRun::NotedRun;
   [[nodiscard]] std::string plot(std::uint32_t number, std::optional<std::uint32_t> robot) override {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    ++plots_answered;
+    std::unique_lock lock(mutex_);
+    ++plots_begun_;
+    now_s_ += .01 + 1e-5 * plots_begun_;  // no two viewers have taken the same time
+    changed_.notify_all();
+    changed_.wait(lock, [this] { return allowed_ >= plots_begun_; });
     return NotedRun::plot(number, robot);
   }
-  std::atomic<int> plots_answered{0};
+  [[nodiscard]] std::string robot(std::uint32_t robot, std::int64_t tick) override {
+    const std::lock_guard lock(mutex_);
+    now_s_ += .0001;
+    ++robots_answered_;
+    changed_.notify_all();
+    return NotedRun::robot(robot, tick);
+  }
+  [[nodiscard]] double now_s() const { return now_s_; }
+  /// Waits until a plot is held.
+  [[nodiscard]] bool holds_a_plot() {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, kLongest, [this] { return plots_begun_ > allowed_; });
+  }
+  /// Lets the plot go on that is held. Returns once the next one is held, or a question about a robot has been answered: true.
+  [[nodiscard]] bool next_answers_a_robot() {
+    std::unique_lock lock(mutex_);
+    const int before = robots_answered_;
+    ++allowed_;
+    changed_.notify_all();
+    changed_.wait_for(lock, kLongest, [&] { return plots_begun_ > allowed_ || robots_answered_ > before; });
+    return robots_answered_ > before;
+  }
+  void let_go(int plots) {
+    const std::lock_guard lock(mutex_);
+    allowed_ += plots;
+    changed_.notify_all();
+  }
+
+ private:
+  static constexpr std::chrono::seconds kLongest{30};
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  int plots_begun_ = 0, allowed_ = 0, robots_answered_ = 0;
+  double now_s_ = 0;  // of the gateway's thread
 };
 
 class GatewayTest : public testing::Test {
@@ -278,29 +315,30 @@ TEST_F(GatewayTest, AStalledViewerDelaysNobodyAndIsSentNoMore) {
 }
 
 TEST_F(GatewayTest, WhoAsksExpensiveQuestionsWaitsForTheOthers) {
-  SlowRun slow(scratch_ / "r.ktrec");
-  gateway_->show(slow, slow.text());
-  constexpr int kGreedy = 12, kRounds = 20;
+  HeldRun run(scratch_ / "r.ktrec");
+  Gateway gateway(0, kToken, PageFiles(scratch_.path() / "page"), [&run] { return run.now_s(); });
+  gateway.show(run, run.text());
+  constexpr int kGreedy = 12, kQuestions = 8, kRounds = 10;
   std::vector<std::unique_ptr<WebSocketClient>> greedy;
-  const auto ask_much = [&greedy] {
-    for (const auto& viewer : greedy)
-      for (int i = 0; i < 8; ++i) viewer->send_text(R"({"do":"plot","plot":0})");
-  };
-  for (int i = 0; i < kGreedy; ++i) greedy.push_back(std::make_unique<WebSocketClient>(port()));
-  WebSocketClient viewer(port());
+  for (int i = 0; i < kGreedy; ++i) greedy.push_back(std::make_unique<WebSocketClient>(gateway.port()));
+  WebSocketClient viewer(gateway.port());
   ASSERT_TRUE(viewer.await("run"));
-  ask_much();
-  ASSERT_TRUE(test::eventually([&] { return slow.plots_answered > kGreedy; }));
-  const int before = slow.plots_answered;
+  for (const auto& one : greedy)
+    for (int i = 0; i < kQuestions; ++i) one->send_text(R"({"do":"plot","plot":0})");
+  int plots = 0;  // that were answered while the viewer's question waited
   for (int i = 0; i < kRounds; ++i) {
-    if (i % 4 == 3) ask_much();
+    ASSERT_TRUE(run.holds_a_plot());
     viewer.send_text(R"({"do":"robot","robot":1,"tick":100})");
+    do ++plots;
+    while (!run.next_answers_a_robot() && plots < kGreedy * kQuestions / 2);
+    run.let_go(1);  // the answer is written before the second one that follows
     ASSERT_TRUE(viewer.await("robot"));
   }
-  EXPECT_LE(slow.plots_answered - before, 3 * kRounds) << "not one of each greedy viewer per answer";
+  // At first all are new and take turns; later, the plot that is held goes on, and one or two that have taken less time.
+  EXPECT_LE(plots, kGreedy + 3 * kRounds) << "not one of each greedy viewer per answer";
   // Nobody starves: all greedy ones get their answers.
+  run.let_go(kGreedy * kQuestions);
   for (const auto& one : greedy) EXPECT_TRUE(one->await("plot"));
-  gateway_.reset();  // before the run that answers
 }
 
 TEST_F(GatewayTest, AViewerThatDoesNotReadItsAnswersHoldsUpNobody) {
