@@ -34,9 +34,6 @@ constexpr auto kMostWatched = milliseconds(200);
 constexpr double kStartPatience_s = 30.0;
 /// The patience grows with the number of services if there are more than this many per core.
 constexpr double kServicesPerCore = 4.0;
-constexpr auto kReportAfter = milliseconds(1000), kReportEvery = milliseconds(5000);
-/// After a wait of this length without progress the report includes the likely cause.
-constexpr auto kCauseAfter = milliseconds(60'000);
 constexpr double kFlush_s = 2.0;
 /// Longest wait for a directive that frames mention while the station is alive.
 constexpr auto kDirectivePatience = milliseconds(10'000);
@@ -251,20 +248,18 @@ void Session::check() const {
 }
 
 /// Prints at intervals the federates for which the session waits. Throws RunError after give_up_after_s_. Requires the mutex.
-void Session::report_wait(Clock::time_point since, const std::string& whom) {
+void Session::report_wait(WaitReport& report, const std::string& whom) {
   const auto now = Clock::now();
-  const double waited_s = std::chrono::duration<double>(now - since).count();
+  const double waited_s = std::chrono::duration<double>(report.waited(now)).count();
   if (give_up_after_s_ > 0 && waited_s >= give_up_after_s_) {
     throw RunError(fmt::format("{} gave up after it had waited {:.0f} s for {}: {}", plan_.name(self_), waited_s,
                                whom, likely_cause()));
   }
-  if (now < next_report_) return;
-  next_report_ = now + kReportEvery;
+  const WaitReport::Due due = report.due(now);
+  if (due == WaitReport::Due::kNothing) return;
   waiting_for_ = whom;
-  const bool reports_cause = now - since >= kCauseAfter && !cause_reported_;
-  cause_reported_ = cause_reported_ || reports_cause;
   say(fmt::format("{} has waited {:.0f} s for {}{}", plan_.name(self_), waited_s, whom,
-                  reports_cause ? ": " + likely_cause() : ""));
+                  due == WaitReport::Due::kWhomAndCause ? ": " + likely_cause() : ""));
 }
 
 std::string Session::likely_cause() const {
@@ -295,13 +290,13 @@ std::string Session::missing_at_start() const {
 }
 
 void Session::assemble(Federate& federate) {
-  auto since = Clock::now();
-  next_report_ = since + kReportAfter;
-  next_idle_ = since;
+  const auto began = Clock::now();
+  WaitReport report(began);
+  next_idle_ = began;
   write_metrics(federate, Report::kFirst);
   // Discovery takes longer with more federates, and hellos compete with it for the processor.
   const auto first_period = std::min(kHelloPeriod * (1 + plan_.federates() / 8), kLongestHelloPeriod);
-  auto next_hello = since;
+  auto next_hello = began;
   auto period = first_period;
   std::string waits_for;
   for (;;) {
@@ -324,11 +319,10 @@ void Session::assemble(Federate& federate) {
     if (whom.empty()) break;
     if (whom != waits_for) {
       waits_for = std::move(whom);
-      since = Clock::now();
-      cause_reported_ = false;
+      report.progress(Clock::now());
       period = first_period;
     }
-    report_wait(since, waits_for);
+    report_wait(report, waits_for);
     arrived_.wait_until(lock, next_hello);
     lock.unlock();
     if (Clock::now() >= next_idle_) idle(federate);
@@ -383,9 +377,7 @@ std::string Session::missing_inputs(Tick now, Clock::duration waited) const {
 }
 
 RunSchedule::Verdict Session::await(Federate& federate, Tick now) {
-  auto since = Clock::now();
-  next_report_ = since + kReportAfter;
-  cause_reported_ = false;
+  WaitReport report(Clock::now());
   std::unique_lock lock(mutex_);
   for (InputBase* input : inputs_) input->gate().reading(now);
   for (;;) {
@@ -402,13 +394,13 @@ RunSchedule::Verdict Session::await(Federate& federate, Tick now) {
     }
     const auto at = Clock::now();
     if (paused()) {
-      since = at;
-    } else if (at >= since + kReportAfter) {
-      const std::string whom = missing_inputs(now, at - since);
+      report.progress(at);
+    } else if (report.waited(at) >= WaitReport::kAfter) {
+      const std::string whom = missing_inputs(now, report.waited(at));
       // The station ends an interrupted run by a directive, which has no effect while the run waits for a lost input.
       if (interrupted() != 0)
         throw RunError(fmt::format("stopped by signal {} while it waited for {}", interrupted(), whom));
-      report_wait(since, whom);
+      report_wait(report, whom);
     }
     if (at < next_idle_) {
       arrived_.wait_until(lock, next_idle_);

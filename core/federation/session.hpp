@@ -29,6 +29,7 @@
 #include "core/dds/dds.hpp"
 #include "core/federation/schedule.hpp"
 #include "core/federation/tick_gate.hpp"
+#include "core/federation/wait_report.hpp"
 #include "core/federation/wire.hpp"
 #include "core/plan/plan.hpp"
 
@@ -133,7 +134,7 @@ class Session {
   [[nodiscard]] bool hears_all() const;
   [[nodiscard]] std::string missing_at_start() const;
   [[nodiscard]] std::string missing_inputs(Tick now, Clock::duration waited) const;
-  void report_wait(Clock::time_point since, const std::string& whom);
+  void report_wait(WaitReport&, const std::string& whom);
   [[nodiscard]] std::string likely_cause() const;
   void leave(Federate&);
   [[nodiscard]] std::string names(std::vector<FederateId>) const;
@@ -153,8 +154,7 @@ class Session {
   bool is_double_ = false;  // another process already runs as this federate
   kilotwin_wire_MemberPhase phase_ = kilotwin_wire_ARRIVING;
   std::string waiting_for_;
-  Clock::time_point next_report_, next_idle_, watched_at_;
-  bool cause_reported_ = false;  // the likely cause of the current wait was printed
+  Clock::time_point next_idle_, watched_at_;
   std::vector<MemberState> members_;
   std::vector<class InputBase*> inputs_;
   std::vector<class OutputBase*> outputs_;

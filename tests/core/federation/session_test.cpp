@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <functional>
+#include <future>
 #include <limits>
 #include <map>
 #include <thread>
@@ -14,6 +16,22 @@
 #include "tests/support/scenes.hpp"
 
 namespace kilotwin {
+namespace {
+
+/// A frame of the station whose decoding the test watches.
+struct WatchedFrame {
+  Tick tick;
+};
+std::function<void(Tick)> on_decoding;  // on a receive thread
+bool from_wire(const WireOverheadFrame& wire, WatchedFrame& frame) {
+  frame.tick = Tick{wire.tick};
+  if (on_decoding) on_decoding(frame.tick);
+  return true;
+}
+const char* defect(const WatchedFrame&, const RunPlan&, FederateId, FederateId) { return nullptr; }
+
+}  // namespace
+template <> struct WireOf<WatchedFrame> { using Type = WireOverheadFrame; };
 namespace {
 
 using namespace std::chrono_literals;
@@ -28,6 +46,7 @@ struct Hooks {
   std::function<void(ActuationFrame&)> spoil_actuation;
   std::function<void(RadioFrame&)> spoil_radio;
   std::function<void(OverheadFrame&)> spoil_overhead;
+  bool watches_overhead = false;
 };
 
 /// A federate of each kind: one partition, radio, station, one host.
@@ -45,6 +64,9 @@ class Tiny : public Federate {
       overhead_in_ =
           std::make_unique<Input<OverheadFrame>>(session, topics::overhead(), std::vector{plan_.station()});
       radio_ = std::make_unique<Output<RadioFrame>>(session, topics::radio(0));
+      if (hooks.watches_overhead)
+        watched_in_ =
+            std::make_unique<Input<WatchedFrame>>(session, topics::overhead(), std::vector{plan_.station()});
     } else if (self == plan_.station()) {
       bodies_in_ = std::make_unique<Input<BodyFrame>>(session, topics::bodies(), physics);
       actuation_in_ = std::make_unique<Input<ActuationFrame>>(session, topics::actuation(), hosts);
@@ -125,6 +147,7 @@ class Tiny : public Federate {
   std::unique_ptr<Input<ActuationFrame>> actuation_in_;
   std::unique_ptr<Input<RadioFrame>> radio_in_;
   std::unique_ptr<Input<OverheadFrame>> overhead_in_;
+  std::unique_ptr<Input<WatchedFrame>> watched_in_;
   std::unique_ptr<Output<BodyFrame>> bodies_;
   std::unique_ptr<Output<ActuationFrame>> actuation_;
   std::unique_ptr<Output<RadioFrame>> radio_;
@@ -347,6 +370,32 @@ TEST_F(Sessions, DoNotWaitForAFederateThatLeftTooEarly) {
   expect_all_name(host_, "behaviours 1/1");
   EXPECT_NE(outcomes_[plan_.radio().value()].failure.find("left without its frame of tick 5"), std::string::npos)
       << outcomes_[1].failure;
+}
+
+TEST_F(Sessions, DecodeFramesWithoutTheirMutex) {
+  std::atomic<Session*> radio{nullptr};
+  std::atomic<int> free{0}, held{0};
+  of(plan_.radio()).watches_overhead = true;
+  of(plan_.radio()).on_publish = [&](Session& session) { radio = &session; };
+  // By a thread of its own: one that held the mutex may not try it.
+  on_decoding = [&](Tick tick) {
+    if (tick < Tick{10} || radio == nullptr || held > 0) return;
+    const bool is_free = std::async(std::launch::async, [&radio] {
+                           const auto until = std::chrono::steady_clock::now() + 5s;
+                           do {
+                             if (const std::unique_lock lock(radio.load()->mutex(), std::try_to_lock); lock)
+                               return true;
+                             std::this_thread::sleep_for(1ms);
+                           } while (std::chrono::steady_clock::now() < until);
+                           return false;
+                         }).get();
+    ++(is_free ? free : held);
+  };
+  run_all();
+  on_decoding = nullptr;
+  expect_all_end_at(kLast);
+  EXPECT_GT(free, 0);
+  EXPECT_EQ(held, 0);
 }
 
 TEST_F(Sessions, PrintForWhomTheyWait) {
