@@ -9,7 +9,7 @@
 
 namespace kilotwin::arenas {
 
-/// An array, row by row.
+/// An array in row-major order.
 struct ArrayLayout {
   std::string name;
   std::string type;  ///< as NumPy names it: f8, i8, u8, u4, u1
@@ -19,7 +19,7 @@ struct ArrayLayout {
 
 class SharedArrays {
  public:
-  /// Lays the arrays out one after the other, and makes the memory, of zeros. Throws RunError if there is not enough.
+  /// Sets the arrays' offsets and allocates zeroed memory for all. Throws RunError if there is too little memory.
   explicit SharedArrays(std::vector<ArrayLayout> arrays);
   ~SharedArrays();
   SharedArrays(const SharedArrays&) = delete;
@@ -27,7 +27,7 @@ class SharedArrays {
 
   [[nodiscard]] const std::vector<ArrayLayout>& layout() const { return arrays_; }
   [[nodiscard]] std::size_t octets() const { return octets_; }
-  /// Of the file that is the memory.
+  /// File descriptor of the memory, for other processes to map.
   [[nodiscard]] int descriptor() const { return descriptor_; }
   /// The elements of array `index`, whose type is T.
   template <class T> [[nodiscard]] std::span<T> array(std::size_t index) const {

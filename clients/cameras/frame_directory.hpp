@@ -1,13 +1,14 @@
 /// FrameDirectory: a plain directory that a station reads as if it were four cameras: frame_%05d_%d.jpg (frame, camera).
 ///
-/// Such a reader goes up from frame 0, waits for a file that is missing, and starts at frame 0 again whenever it changes its
-/// mode. So that it sees the arena as it is, the directory follows the reader: the kernel says which file is opened (inotify).
+/// A station reads frames in ascending order from 0, waits for a file that is missing, and returns to frame 0 whenever it changes
+/// its mode. The directory follows the reader, so that the station sees the present state of the arena: inotify reports which file
+/// the station opens.
 ///
-///   - Of each camera there are the frame 0, the frame that was opened last, and the one after it. All others are removed.
-///   - Files that nobody has opened of late are replaced by newer pictures, by rename. Frame 0 is fresh for a new start, and the
-///     next frame is never old.
-///   - While one camera's frame is being read, the frame of that number stays for all cameras: together they show one instant.
-///   - A camera whose frame 0 is opened after others starts again: its later frames are removed.
+///   - The directory holds three frames of each camera: frame 0, the frame that was opened last, and the next one.
+///   - A file that has not been opened for a while is replaced by a newer picture, by rename. So frame 0 and the next frame are
+///     always recent.
+///   - While a file of a frame is being read, the frame stays unchanged for all cameras, so that its pictures show one instant.
+///   - If a reader opens a camera's frame 0 again, that camera's later frames are removed.
 #pragma once
 
 #include <array>
@@ -31,16 +32,16 @@ class FrameDirectory {
   /// written or watched.
   FrameDirectory(std::filesystem::path directory, std::uint32_t cameras);
 
-  /// Takes notice of what was opened since the last call.
+  /// Processes the events since the last call.
   void look();
-  /// Waits until a file is opened, `patience` at most.
+  /// Waits until a file is opened, or until `patience` has passed.
   void wait(std::chrono::milliseconds patience) const;
-  /// Whether new pictures are of use: a file is missing, or one that may be read next is old.
+  /// Whether put() would write anything: a file is missing, or a file that may be read next is old.
   [[nodiscard]] bool wants_pictures() const;
-  /// New pictures, one per camera, encoded: they become the content of all files that may be replaced.
+  /// Writes new pictures, one JPEG per camera, to all files that may be replaced.
   void put(std::vector<std::string> pictures);
 
-  /// The frame that was opened last, of a camera; 0 at first.
+  /// Number of the camera's frame that was opened last; 0 before the first.
   [[nodiscard]] std::uint32_t opened(std::uint32_t camera) const { return opened_.at(camera); }
 
  private:

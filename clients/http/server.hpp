@@ -1,7 +1,7 @@
 /// Server: libwebsockets on one address and port, with or without TLS, served from a thread of its own.
 ///
-/// What is served is up to the protocols, whose callbacks run on that thread. Their user pointer is that of the context:
-/// lws_context_user(). Declare the server as the last member of what the callbacks use: it ends before the rest.
+/// The caller's libwebsockets protocols define what is served. Their callbacks run on the server's thread and find their object by
+/// lws_context_user(). Declare the server as that object's last member, so that its thread ends before other members are destroyed.
 #pragma once
 
 #include <libwebsockets.h>
@@ -28,8 +28,8 @@ namespace kilotwin::http {
 
 class Server {
  public:
-  /// `wanted`: protocols, user, and bounds other than the library's; address and identity are set here. Throws UserError with the
-  /// words `refusal` where the port cannot be served, and what Endpoint::check() throws.
+  /// `wanted`: protocols, user pointer and limits; the constructor sets address, port and certificate. Throws UserError with the
+  /// text `refusal` if the port cannot be served. Throws what Endpoint::check() throws.
   Server(const Endpoint& endpoint, lws_context_creation_info wanted, const std::string& refusal);
   ~Server();
   Server(const Server&) = delete;
@@ -37,13 +37,14 @@ class Server {
   [[nodiscard]] std::uint16_t port() const { return port_; }
   /// "http://127.0.0.1:8000": what stands before the path in addresses.
   [[nodiscard]] std::string origin() const;
-  /// Whether the request's `Host` is the endpoint's: a page of another origin could reach the port under a name of its own.
+  /// Whether the request's `Host` names this endpoint. A page of another origin can reach the port by a name of its own (DNS
+  /// rebinding); its requests then carry that name.
   [[nodiscard]] bool is_named_by(lws* connection) const;
   /// Whether the request comes from a page of this server, or from no page.
   [[nodiscard]] bool is_own_page(lws* connection) const;
   /// Wakes the thread: every protocol gets LWS_CALLBACK_EVENT_WAIT_CANCELLED. From any thread.
   void wake();
-  /// Writes from a callback. False where the library took less than all; what the socket does not take at once, it keeps.
+  /// Sends a message; to be called from a callback. libwebsockets buffers what the socket does not take. False on failure.
   [[nodiscard]] bool write(lws* connection, std::string_view text, lws_write_protocol protocol);
 
  private:

@@ -1,4 +1,4 @@
-/// What is tested of single robots, and of all of them together.
+/// The hypotheses that the monitor tests: effects on a single robot, and effects on all robots together.
 #pragma once
 
 #include <span>
@@ -8,7 +8,7 @@
 
 namespace kilotwin::monitor {
 
-/// Groups of columns whose dispersion is learned together.
+/// Hypotheses of one group share one estimate of dispersion (dispersion.hpp).
 enum class Group : std::uint8_t { kGain, kBias, kHeading, kDrift, kShift, kCount };
 
 struct Hypothesis {
@@ -17,22 +17,22 @@ struct Hypothesis {
   SizePrior prior;
 };
 
-/// Which grid the hypothesis' starts are of.
+/// The grid of onset times (signatures.hpp) on which hypotheses of this group are tested.
 [[nodiscard]] constexpr Family family_of(Group group) {
   return group == Group::kHeading || group == Group::kShift ? Family::kAbsorbed : Family::kLasting;
 }
 
-/// Of a single robot.
+/// Effects on a single robot: wheel gains and biases, heading, drift.
 [[nodiscard]] std::span<const Hypothesis> robot_hypotheses();
-/// Of all robots: gain and drift; calibration shifts; patches.
+/// Effects on all robots together.
 [[nodiscard]] const Hypothesis& gain_of_all();
 [[nodiscard]] const Hypothesis& drift_of_all();
 [[nodiscard]] const Hypothesis& calibration_shift();
 [[nodiscard]] const Hypothesis& patch();
 
-/// The sums of a hypothesis of a robot, from a slot on.
+/// The sufficient statistics of a robot's hypothesis, for an onset at `slot`.
 [[nodiscard]] Sums sums_of(Suspect suspect, const Signatures& signatures, std::size_t slot, double wheel_base_mm);
-/// Of a shift in the columns from `first` on.
+/// The same for a calibration shift, whose `dimensions` columns begin at `first`.
 [[nodiscard]] Sums shift_sums(const Signatures& signatures, std::size_t first, std::size_t slot,
                               std::size_t dimensions);
 

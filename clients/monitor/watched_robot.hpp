@@ -1,4 +1,4 @@
-/// One tracked robot under the monitor: its filter, its signatures, and whether it is being tested.
+/// A tracked robot that the monitor observes: its pose filter, its test statistics (signatures), and the state of its tests.
 #pragma once
 
 #include <array>
@@ -25,44 +25,44 @@ class WatchedRobot {
   };
   WatchedRobot(std::uint32_t id, const Setting& setting);
 
-  /// The motion of the step from `tick`; ticks ascend by one.
+  /// Adds the motion that the model predicts for the step from `tick`. Ticks ascend by one.
   void add_motion(Tick tick, const WheelMotion& motion);
-  /// Nothing is known of where it is: it is absent, or its commands are not known.
+  /// Discards the pose estimate: the robot is absent, or its commands are unknown.
   void lose();
-  /// Contacts or a known patch disturb it from now on for half a second.
+  /// Suspends the tests for half a second from `cycle`, because a contact or a known patch acts on the robot.
   void disturb(std::int64_t cycle);
 
-  /// Takes a measurement up to which the motion is known. Returns its innovation; none where the estimate begins with it, or it is
-  /// too old.
+  /// Updates the filter by a measurement; the motion must be known up to its time. Returns the innovation. Returns none if the
+  /// measurement starts the estimate or is too old.
   std::optional<Innovation> measure(const MeasuredPose& measured, std::uint32_t tracker, Dispersion& dispersion);
 
-  /// After an alarm: for a minute nothing is tested or learned. Then tests begin anew, on probation at first.
+  /// After an alarm: suspends tests and learning for a minute. Tests then restart, on probation at first.
   void hold();
-  /// Tests have begun anew after a hold: what differs now has not gone away.
+  /// Whether tests have just restarted after a hold. A detection then means that the earlier effect persists.
   [[nodiscard]] bool is_on_probation() const;
-  /// The biases are learned again, and tests begin after another warm-up.
+  /// Estimates the biases again; tests restart after another warm-up.
   void relearn();
-  /// After an alarm of its tracker or the arena: the pose is found again, tests begin anew.
+  /// After an alarm of its tracker or of the arena: estimates the pose again and restarts the tests.
   void restart_tests();
   void clear_slot(Family family, std::size_t slot) { signatures_.clear(family, slot); }
 
   [[nodiscard]] std::uint32_t id() const { return id_; }
   [[nodiscard]] bool is_followed() const { return phase_ == Phase::kFollowed; }
-  /// It is followed, and its warm-up is over.
+  /// Whether the filter has converged and the warm-up is over.
   [[nodiscard]] bool is_tested() const { return is_followed() && is_warm_; }
-  /// The last measurement entered the sums.
+  /// Whether the last measurement was added to the test statistics.
   [[nodiscard]] bool counts() const { return counts_; }
   [[nodiscard]] const Signatures& signatures() const { return signatures_; }
   [[nodiscard]] PlaceSignature& place() { return place_; }
   [[nodiscard]] const RobotFilter& filter() const { return filter_; }
   [[nodiscard]] double tested_s() const { return tested_s_; }
   [[nodiscard]] std::uint64_t restarts() const { return restarts_; }
-  /// Whether its first warm-up has just ended; asked once.
+  /// Whether the first warm-up has ended; true once.
   [[nodiscard]] bool take_first_warm() { return std::exchange(first_warm_, false); }
 
  private:
   enum class Phase : std::uint8_t { kUnknown, kSeeksHeading, kFollowed };
-  /// Motions that are remembered, ticks.
+  /// Length of the motion history, ticks.
   static constexpr std::int64_t kHistory = 64;
 
   [[nodiscard]] const WheelMotion& motion_of(std::int64_t tick) const {
@@ -95,7 +95,7 @@ class WatchedRobot {
   std::uint32_t outliers_ = 0;  ///< in a row
   std::uint64_t restarts_ = 0;
   double tested_s_ = 0;
-  MeasuredPose sought_from_;                                        ///< begin of the stretch that shows the heading
+  MeasuredPose sought_from_;                                        ///< start of the motion from which the heading is estimated
   double sought_x_mm_ = 0, sought_y_mm_ = 0, sought_turn_rad_ = 0;  ///< motion since, as if the heading had been 0
 };
 

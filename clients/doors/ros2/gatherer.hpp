@@ -12,9 +12,11 @@
 
 namespace kilotwin::doors::ros2 {
 
-/// A frame waits for robots until all robots of the frame before have come, a message with all robots has come, or the hold time
-/// has passed. Frames leave in the order of their stamps. A message older than the last frame is late and left out, except that
-/// a stamp more than a second older begins the source's clock anew. Robots of late messages are waited for from then on.
+/// A frame is complete once it has all robots of the previous frame, or one message that lists all robots. An incomplete frame is
+/// released after the hold time. Frames are released in the order of their stamps.
+///
+/// A message whose stamp is older than the last released frame is late and is dropped. Later frames wait for its robots too. If
+/// the stamp is more than a second older, the source has restarted its clock, and the message begins a new series of frames.
 class Gatherer {
  public:
   struct Arrival {
