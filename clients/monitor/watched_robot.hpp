@@ -95,7 +95,7 @@ class WatchedRobot {
   std::uint32_t outliers_ = 0;  ///< in a row
   std::uint64_t restarts_ = 0;
   double tested_s_ = 0;
-  MeasuredPose sought_from_;                                        ///< start of the motion from which the heading is estimated
+  MeasuredPose sought_from_;  ///< start of the motion from which the heading is estimated
   double sought_x_mm_ = 0, sought_y_mm_ = 0, sought_turn_rad_ = 0;  ///< motion since, as if the heading had been 0
 };
 
