@@ -163,6 +163,20 @@ TEST(Dialects, Cpp) {
   EXPECT_EQ(swarm.led(0), 42);
 }
 
+TEST(Dialects, CppAndCDrawTheSameRandomNumbers) {
+  const std::string body =
+      "#include <kilolib.h>\n#include <stdlib.h>\nvoid setup() { uint32_t state = 7; srand(7);\n"
+      "  set_color(rand() == rand_r(&state) && rand() == rand_r(&state) ? 9 : 1); }\n"
+      "void loop() {}\n" +
+      kMain;
+  for (const char* const name : {"a.c", "a.cpp"}) {
+    const Folder folder;
+    Swarm swarm({folder.write(name, body).string()}, 1);
+    swarm.start();
+    EXPECT_EQ(swarm.led(0), 9) << name;
+  }
+}
+
 TEST(Dialects, KilomboProgramsRunAsOnTheRobot) {
   const Folder folder;
   const fs::path source =
@@ -288,6 +302,22 @@ TEST(Printing, ReachesTheHostImmediatelyAndInOrder) {
   ASSERT_EQ(swarm.hosts[0]->printed().size(), 2u);
   EXPECT_EQ(swarm.hosts[0]->printed()[0].text, "late\n");
   EXPECT_EQ(swarm.hosts[0]->robots_failed(), 2u);
+}
+
+TEST(Printing, NumbersOf64BitsKeepTheirSizeWhateverLongIs) {
+  Swarm swarm({"#include <kilolib.h>\n#include <stdio.h>\n#include <inttypes.h>\n"
+               "void setup() { int64_t n = -INT64_C(1099511627777); uint64_t u = UINT64_C(18446744073709551615);\n"
+               "  int32_t l = INT32_C(-2147483647); uint16_t s = 65535;\n"
+               "  printf(\"%\" PRId64 \" %\" PRIu64 \" %\" PRId32 \" %\" PRIu16 \" %d\", n, u, l, s, 5); }\n"
+               "void loop() {}\n" +
+               kMain},
+              1);
+  Air air;
+  air.receptions.push_back({0, message(kRun)});
+  swarm.step();
+  swarm.step(air);
+  ASSERT_EQ(swarm.hosts[0]->printed().size(), 1u);
+  EXPECT_EQ(swarm.hosts[0]->printed()[0].text, "-1099511627777 18446744073709551615 -2147483647 65535 5");
 }
 
 TEST(Printing, IsCompiledToNothingWithoutDebug) {

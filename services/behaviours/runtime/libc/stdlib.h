@@ -52,6 +52,23 @@ long random_r(unsigned int* state);
 #else
 int rand_r(unsigned long* state);
 long random_r(unsigned long* state);
+#ifdef __cplusplus
+/* Programs may pass a uint32_t, which is the robot's unsigned long. */
+extern "C++" {
+inline int rand_r(unsigned int* state) {
+  unsigned long wide = *state;
+  const int number = rand_r(&wide);
+  *state = (unsigned int)wide;
+  return number;
+}
+inline long random_r(unsigned int* state) {
+  unsigned long wide = *state;
+  const long number = random_r(&wide);
+  *state = (unsigned int)wide;
+  return number;
+}
+}
+#endif
 #endif
 long random(void);
 void srandom(unsigned long seed);
