@@ -11,6 +11,7 @@
 #include "core/observations/variable_sampler.hpp"
 #include "core/os/files.hpp"
 #include "services/behaviours/program_variables.hpp"
+#include "services/comm/radio_counters.hpp"
 
 namespace kilotwin::cli {
 namespace {
@@ -56,19 +57,21 @@ void add_scalar(proto::Manifest& manifest, const behaviours::ScalarVariable& sca
   *variable.add_place() = place_of(scalar, program);
 }
 
-/// Whether the name is the robots' battery. Throws UserError, without a place, where it cannot be.
-bool is_battery(const std::string& name, const proto::Experiment& experiment,
-                const std::vector<std::string>& elves) {
-  if (name != kBatteryVariable) return false;
+/// Makes the entry of a variable that is no program's: the robots' battery, or a counter of the radio. False: the name is none of
+/// these. Throws UserError, without a place, where it cannot be recorded.
+bool add_observed(proto::Manifest& manifest, const std::string& name, double every_s,
+                  const proto::Experiment& experiment, const std::vector<std::string>& elves) {
+  const bool is_battery = name == kBatteryVariable;
+  if (!is_battery && comm::radio_counter(name) == nullptr) return false;
   for (const std::string& elf : elves) {
     if (!behaviours::find_variable(elf, behaviours::VariablePath::parse(name)).empty())
-      throw UserError(fmt::format(
-          "{} is the voltage of the robots' batteries, and a program has a variable of that name; give the "
-          "program's another one",
-          name));
+      throw UserError(
+          fmt::format("{} is {}, and a program has a variable of that name; give the program's another one", name,
+                      is_battery ? "the voltage of the robots' batteries" : "a counter of the radio"));
   }
-  if (!experiment.has_battery())
+  if (is_battery && !experiment.has_battery())
     throw UserError(fmt::format("{}: the experiment has no batteries; add battery {{ }} to it", name));
+  entry_of(manifest, name, every_s).set_integer(!is_battery);
   return true;
 }
 
@@ -97,10 +100,7 @@ void add_recorded_variables(const LoadedExperiment& loaded, const std::vector<st
     const std::string place = fmt::format("recording.variable[{}].name", v);
     bool any = false;
     try {
-      if (is_battery(wanted.name(), loaded.experiment, elves)) {
-        entry_of(manifest, wanted.name(), wanted.every_s()).set_integer(false);
-        continue;
-      }
+      if (add_observed(manifest, wanted.name(), wanted.every_s(), loaded.experiment, elves)) continue;
       const auto path = behaviours::VariablePath::parse(wanted.name());
       for (std::uint32_t program = 0; program < elves.size(); ++program) {
         for (const auto& scalar : behaviours::find_variable(elves[program], path)) {

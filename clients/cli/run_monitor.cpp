@@ -57,10 +57,22 @@ RunMonitor::RunMonitor(const RunPlan& plan, const MonitorOptions& options, std::
   if (table_.empty()) return;
   os::write_file(table_, rows_);
   os::write_file(alarm_lines(table_), lines_);
+  residuals_.emplace(residual_table(table_), os::OutputFile::Existing::kReplace);
+  residuals_->buffer() += monitor::residuals_header() + "\n";
+  residuals_->flush();
+}
+
+/// Once per second of simulated time: whoever follows the file sees whole rows.
+void RunMonitor::write_residuals() {
+  const std::vector<monitor::Residual> fresh = monitor_.take_residuals();
+  if (fresh.empty() || !residuals_) return;
+  for (const monitor::Residual& residual : fresh) residuals_->buffer() += monitor::residuals_row(residual) + "\n";
+  residuals_->flush();
 }
 
 void RunMonitor::state(const SwarmView& swarm) {
   monitor_.advance(swarm);
+  write_residuals();
   std::vector<monitor::Alarm> fresh = monitor_.take_alarms();
   if (fresh.empty()) return;
   for (monitor::Alarm& alarm : fresh) {
@@ -79,5 +91,11 @@ void RunMonitor::state(const SwarmView& swarm) {
 std::string RunMonitor::report() const { return monitor::report_json(settings_, monitor_.totals(), alarms_); }
 
 std::filesystem::path alarm_lines(std::filesystem::path table) { return table.replace_extension(".txt"); }
+
+std::filesystem::path residual_table(const std::filesystem::path& table) {
+  std::string name = table.filename().string();
+  if (const std::size_t at = name.find("alarms"); at != std::string::npos) name.replace(at, 6, "residuals");
+  return table.parent_path() / name;
+}
 
 }  // namespace kilotwin::cli

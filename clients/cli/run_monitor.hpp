@@ -1,4 +1,5 @@
-/// The residual monitor of a run or of its replay: its options, and its alarms as lines and as a table.
+/// The residual monitor of a run or of its replay: its options, its alarms as lines and as a table, and its
+/// residuals as a table.
 #pragma once
 
 #include <filesystem>
@@ -9,6 +10,7 @@
 
 #include "clients/monitor/monitor.hpp"
 #include "core/federation/run_observer.hpp"
+#include "core/os/files.hpp"
 #include "core/plan/plan.hpp"
 
 namespace CLI {
@@ -32,26 +34,31 @@ void check_monitor_options(const MonitorOptions& options);
 
 class RunMonitor {
  public:
-  /// Writes the table and the lines of alarms to `table` (.csv) and beside it (.txt) as they come; an empty path: nowhere. Throws
-  /// UserError if the monitor has nothing to watch.
+  /// Writes the table and the lines of alarms to `table` (.csv) and beside it (.txt) as they come, and residuals to
+  /// residual_table(table); an empty path: nowhere. Throws UserError if the monitor has nothing to watch.
   RunMonitor(const RunPlan& plan, const MonitorOptions& options, std::filesystem::path table);
 
   void tracker_sample(const TrackerSample& sample) { monitor_.take(sample); }
-  /// Prints alarms as they come.
+  /// Prints alarms as they come. Throws RunError if a table cannot be written.
   void state(const SwarmView& swarm);
   [[nodiscard]] const std::vector<monitor::Alarm>& alarms() const { return alarms_; }
   /// For summary.json.
   [[nodiscard]] std::string report() const;
 
  private:
+  void write_residuals();
+
   const monitor::MonitorSettings settings_;
   const std::filesystem::path table_;
   monitor::Monitor monitor_;
   std::vector<monitor::Alarm> alarms_;
   std::string rows_, lines_;  ///< of all alarms
+  std::optional<os::OutputFile> residuals_;
 };
 
 /// The file of lines beside a table of alarms.
 [[nodiscard]] std::filesystem::path alarm_lines(std::filesystem::path table);
+/// The file of residuals beside it: residuals.csv beside alarms.csv, residuals-replayed.csv beside alarms-replayed.csv.
+[[nodiscard]] std::filesystem::path residual_table(const std::filesystem::path& table);
 
 }  // namespace kilotwin::cli

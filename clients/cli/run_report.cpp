@@ -40,8 +40,8 @@ using recorder::Summary;
 
 /// Points of a curve on the page; of longer ones every n-th is shown.
 constexpr std::size_t kMostPoints = 600;
-/// States times robots of which a run draws curves by itself: that takes some 3 s. A recorded state has some 26 octets per robot.
-constexpr std::uint64_t kMostRobotStates = 10'000'000, kBytesPerRobotState = 26;
+/// Of a recorded state per robot, at most.
+constexpr std::uint64_t kBytesPerRobotState = 26;
 /// Two beside each other fill the page.
 constexpr int kCurveWidth_px = 480, kCurveHeight_px = 300;
 /// Of a larger picture, as of 100,000 robots, the page has a link.
@@ -199,20 +199,35 @@ Plot curve(const std::string& name, const std::string& unit, const std::vector<d
   return plot;
 }
 
+/// Curves of all states, or of every n-th one so that at most `most_robot_states` are read. Then `step` > 1.
+recorder::ObservableCurves observe_some(const recorder::RunDirectory& directory, std::uint64_t most_robot_states,
+                                        std::size_t& step) {
+  recorder::Reader recording(directory.recording());
+  step = 1;
+  if (fs::file_size(directory.recording()) / kBytesPerRobotState <= most_robot_states)
+    return recorder::observe(recording);
+  recorder::StateIndex index(directory.recording());
+  static_cast<void>(index.update());
+  const std::uint64_t robot_states = index.states().size() * recording.header().robots();
+  step = static_cast<std::size_t>((robot_states + most_robot_states - 1) / most_robot_states);
+  return step <= 1 ? recorder::observe(recording) : recorder::observe_every(recording, index, step);
+}
+
 /// Curves over time, or why there are none.
 void add_curves(Data& page, const recorder::RunDirectory& directory, std::uint64_t most_robot_states) {
   if (!Gnuplot::installed()) {
-    page.set("no_curves", "No curves: gnuplot is not installed. scripts/setup installs it.");
+    page.set("curves_note", "No curves: gnuplot is not installed. scripts/setup installs it.");
     return;
   }
-  recorder::Reader recording(directory.recording());
-  if (fs::file_size(directory.recording()) / kBytesPerRobotState > most_robot_states) {
-    page.set("no_curves", "No curves: the recording is long. kilotwin export RUN --report FILE draws them.");
-    return;
-  }
-  const recorder::ObservableCurves curves = recorder::observe(recording);
+  std::size_t step = 1;
+  const recorder::ObservableCurves curves = observe_some(directory, most_robot_states, step);
+  if (step > 1)
+    page.set("curves_note",
+             fmt::format("The recording is long: the curves are of one state in {}. kilotwin export RUN "
+                         "--report FILE draws them of all states.",
+                         step));
   if (curves.time_s.size() < 2) {
-    page.set("no_curves", "No curves: the recording has fewer than two states.");
+    page.set("curves_note", "No curves: the recording has fewer than two states.");
     return;
   }
   Gnuplot gnuplot;
@@ -384,7 +399,7 @@ Facts provenance_facts(const Summary& s) {
           {"machine", fmt::format("{}, {} cores", s.provenance.host, s.provenance.cores)}};
 }
 
-/// `most_robot_states`: of longer recordings it has no curves.
+/// `most_robot_states`: of longer recordings its curves are of every n-th state.
 std::string page_of(const recorder::RunDirectory& directory, std::uint64_t most_robot_states) {
   const Summary s = recorder::read_summary(directory.summary());
   const RunPlan plan(directory.read_manifest());
@@ -419,10 +434,10 @@ std::string run_report(const recorder::RunDirectory& directory) {
   return page_of(directory, std::numeric_limits<std::uint64_t>::max());
 }
 
-void write_run_report(const recorder::RunDirectory& directory) {
+void write_run_report(const recorder::RunDirectory& directory, std::uint64_t most_robot_states) {
   if (!fs::exists(directory.summary())) return;
   try {
-    os::write_file(directory.report(), page_of(directory, kMostRobotStates));
+    os::write_file(directory.report(), page_of(directory, most_robot_states));
   } catch (const std::exception& error) {
     warn(fmt::format("kilotwin: no report.html: {}", error.what()));
   }

@@ -82,7 +82,8 @@ Monitor::Monitor(const RunPlan& plan, const MonitorSettings& settings, CommandTa
       wheel_base_mm_(plan.motion_settings().wheel_base_mm),
       notes_(watched_.size()),
       entry_of_(plan.robots(), -1),
-      duties_(plan.robots()) {
+      duties_(plan.robots()),
+      residuals_(watched_) {
   const BiasNoise slow = bias_noise(plan);
   const Geometry geometry{wheel_base_mm_, plan.motion_settings().axle_offset_mm};
   for (std::uint32_t i = 0; i < watched_.size(); ++i) {
@@ -139,6 +140,7 @@ void Monitor::advance(const SwarmView& swarm) {
   if (const auto slot = fine_.advance(swarm.tick)) {
     for (WatchedRobot& robot : robots_) robot.clear_slot(Family::kAbsorbed, *slot);
   }
+  residuals_.advance(seconds(swarm.tick));
   process_samples(swarm);
   evaluate(swarm.tick);
 }
@@ -168,6 +170,7 @@ void Monitor::process(const TrackerSample& sample, const SwarmView& swarm) {
     if (!innovation) continue;
     ++totals_.samples;
     totals_.outliers += innovation->is_outlier ? 1u : 0u;
+    residuals_.add(i, *innovation, robot.counts());
     if (robot.counts()) {
       for (std::size_t d = 0; d < innovation->dimensions; ++d) {
         white_sum_[d] += innovation->white[d];

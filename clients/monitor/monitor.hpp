@@ -16,6 +16,7 @@
 #include "clients/monitor/commanded_motion.hpp"
 #include "clients/monitor/contacts.hpp"
 #include "clients/monitor/places.hpp"
+#include "clients/monitor/residuals.hpp"
 #include "clients/monitor/settings.hpp"
 #include "clients/monitor/start_grid.hpp"
 #include "clients/monitor/watched_robot.hpp"
@@ -46,6 +47,8 @@ class Monitor {
   void advance(const SwarmView& swarm);
   /// The alarms since the last call, in order.
   [[nodiscard]] std::vector<Alarm> take_alarms() { return std::exchange(alarms_, {}); }
+  /// The residuals of whole seconds since the last call, by time, then robot.
+  [[nodiscard]] std::vector<Residual> take_residuals() { return residuals_.take(); }
   [[nodiscard]] Totals totals() const;
 
   /// Gets every innovation of a robot that is not disturbed; for tests and measurements.
@@ -120,6 +123,7 @@ class Monitor {
   std::vector<TrackerSample> waiting_;
   std::uint32_t arena_above_ = 0;
   std::vector<Alarm> alarms_;
+  Residuals residuals_;
   Totals totals_;
   std::array<double, 3> white_sum_{}, white_squares_{}, white_count_{};
 };

@@ -11,6 +11,7 @@
 #include "clients/recorder/ordered_records.hpp"
 #include "clients/recorder/statistics.hpp"
 #include "clients/recorder/swarm_observables.hpp"
+#include "clients/recorder/variables_until.hpp"
 #include "core/base/error.hpp"
 #include "core/math/elementary.h"
 
@@ -130,6 +131,7 @@ class RobotsObserver {
   }
   [[nodiscard]] bool takes_variables() const { return own_.any(); }
   void take(const proto::VariableRecord& variable) { own_.take(variable); }
+  [[nodiscard]] SwarmObservables& own() { return own_; }
   void take(double time_s, const proto::StateRecord& state) {
     const auto column = [&](const auto& field) { return values(field).subspan(first_, count_); };
     observer_.add(time_s, column(state.x_mm()), column(state.y_mm()), column(state.heading_rad()),
@@ -173,6 +175,21 @@ ObservableCurves observe(Reader& recording) {
   std::vector<RobotsObserver> all;
   all.emplace_back(recording.header(), std::nullopt);
   return std::move(observe(recording, std::move(all)).front());
+}
+
+ObservableCurves observe_every(Reader& recording, const StateIndex& index, std::size_t step) {
+  RobotsObserver all(recording.header(), std::nullopt);
+  VariablesUntil variables(recording, index);
+  const std::vector<StateIndex::Entry>& states = index.states();
+  for (std::size_t i = 0; i < states.size();
+       i = i + 1 == states.size() ? i + 1 : std::min(i + step, states.size() - 1)) {
+    if (all.takes_variables()) variables.take(states[i].tick, all.own());
+    recording.go_to(states[i].offset);
+    const proto::Record* const record = recording.next();
+    if (record == nullptr || !record->has_state()) continue;
+    all.take(recording.tick_length().seconds_at(Tick{record->state().tick()}), record->state());
+  }
+  return all.curves();
 }
 
 std::vector<ObservableCurves> observe_with_groups(Reader& recording) {

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "clients/recorder/reader.hpp"
+#include "clients/recorder/state_index.hpp"
 
 namespace kilotwin::recorder {
 
@@ -71,6 +72,8 @@ class ObservableObserver {
 /// Observables of all remaining states of a recording, those of the experiment included. Throws UserError where the recording holds an
 /// expression that cannot be read.
 [[nodiscard]] ObservableCurves observe(Reader& recording);
+/// The same of every `step`-th state from the first on, and of the last. `index`: of the same recording.
+[[nodiscard]] ObservableCurves observe_every(Reader& recording, const StateIndex& index, std::size_t step);
 /// The same, followed by those of each group of robots as if the swarm were that group. Movable bodies stay as they are.
 [[nodiscard]] std::vector<ObservableCurves> observe_with_groups(Reader& recording);
 

@@ -8,6 +8,7 @@
 ///   provenance.json  clients/recorder/provenance.hpp
 ///   summary.json     clients/recorder/summary.hpp
 ///   alarms.csv, .txt alarms of the residual monitor as a table and as lines; alarms-replayed.*: of the last replay
+///   residuals.csv    residuals of the monitor; residuals-replayed.csv: of the last replay
 ///   picture.svg      clients/recorder/picture.hpp
 ///   animation.svg    clients/recorder/animation.hpp
 ///   report.html      what happened, on one page: clients/cli/run_report.hpp

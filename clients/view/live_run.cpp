@@ -189,6 +189,8 @@ void LiveRun::begin(Gateway& gateway) {
       packets_.clear();
       live_work_.clear();
       live_flights_.clear();
+      observables_.reset();
+      if (directory_.empty()) observables_.emplace(*facts.experiment, facts.robots);
       x_mm_.clear();
       y_mm_.clear();
     }
@@ -213,6 +215,7 @@ void LiveRun::post_state(Gateway& gateway) {
   next_post_ = Clock::now() + kBetweenStatesOfAFastRun;
   {
     const std::lock_guard lock(mutex_);
+    if (observables_) observables_->take(observer_.state()->time_s, swarm, Clock::now());
     if (plan_ && plan_->light_settings()) {
       x_mm_ = swarm.x_mm;
       y_mm_ = swarm.y_mm;
@@ -281,12 +284,16 @@ std::string LiveRun::robot(std::uint32_t robot, std::int64_t tick) {
 
 std::string LiveRun::plots() {
   const std::shared_ptr<RecordedRun> recorded = recording();
-  return recorded ? recorded->plots() : R"({"type":"plots","plots":[]})";
+  if (recorded) return recorded->plots();
+  const std::lock_guard lock(mutex_);
+  return observables_ ? observables_->list() : plots_text({});
 }
 
 std::string LiveRun::plot(std::uint32_t number, std::optional<std::uint32_t> robot) {
   const std::shared_ptr<RecordedRun> recorded = recording();
-  return recorded ? recorded->plot(number, robot) : std::string();
+  if (recorded) return recorded->plot(number, robot);
+  const std::lock_guard lock(mutex_);
+  return observables_ && !robot ? observables_->plot(number) : std::string();
 }
 
 std::string LiveRun::program(std::uint32_t robot, std::int64_t tick) {

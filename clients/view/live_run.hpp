@@ -1,6 +1,6 @@
 /// LiveRun: runs on a domain as they happen. States come from an observer, which can never slow a run; requests go out as
 /// RunControl, as any other program's would. Curves, variables, logs, floors and counts of messages come from the run's recording
-/// while it grows, where its directory is given.
+/// while it grows, where its directory is given. Else observables of the experiment are computed of the states.
 #pragma once
 
 #include <atomic>
@@ -19,6 +19,7 @@
 #include "clients/view/frame_code.hpp"
 #include "clients/view/gateway.hpp"
 #include "clients/view/light_picture.hpp"
+#include "clients/view/live_observables.hpp"
 #include "clients/view/recorded_run.hpp"
 #include "clients/view/work.hpp"
 #include "core/federation/topics.hpp"
@@ -90,8 +91,9 @@ class LiveRun : public Answers {
   std::deque<ShownPacket> packets_;          // the newest
   LiveWork live_work_;
   LiveFlights live_flights_;
-  std::vector<double> x_mm_, y_mm_;    // of the newest state, where the run has light
-  Clock::time_point flights_until_{};  // until then messages are wanted
+  std::optional<LiveObservables> observables_;  // where the directory is not known
+  std::vector<double> x_mm_, y_mm_;             // of the newest state, where the run has light
+  Clock::time_point flights_until_{};           // until then messages are wanted
   dds::Reader<PublicRunStatus> statuses_;
   dds::Reader<PublicTrackerFrame> tracker_frames_;
   dds::Reader<PublicStationPacket> station_packets_;

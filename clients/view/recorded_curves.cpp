@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 
 #include "clients/view/recently_used.hpp"
 #include "clients/view/run_text.hpp"
@@ -16,7 +15,6 @@ namespace kilotwin::view {
 namespace {
 
 using namespace std::chrono_literals;
-using nlohmann::json;
 
 /// What one curve may read of the file, and the octets per robot of a state and of the value of a variable.
 constexpr std::size_t kCurveBytes = 48'000'000, kStateBytesPerRobot = 26, kValueBytesPerRobot = 6;
@@ -29,8 +27,6 @@ constexpr std::size_t kMostAnswers = 64;
 constexpr std::size_t kMostRecordsPerAnswer = 4000;
 /// Curves of which it is remembered what was read. More than viewers that look at different robots at once, as a rule.
 constexpr std::size_t kMostEventCounts = 32, kMostKnownPoints = 64;
-/// Records of one variable that are taken between two states at most, the newest ones.
-constexpr std::size_t kMostValueRecords = 256;
 /// Variables and events reach the recording at most so many ticks after the newest one, and some more.
 constexpr std::int64_t kSettled_ticks = 128;
 constexpr std::int64_t kEver = std::numeric_limits<std::int64_t>::max();
@@ -44,16 +40,6 @@ struct EventPlot {
 constexpr std::array<EventPlot, 3> kEventPlots{{{proto::SENT, "sent", "messages sent, recorded"},
                                                 {proto::RECEIVED, "received", "messages received, recorded"},
                                                 {proto::FAILURE, "failures", "failures of programs"}}};
-
-/// Numbers in JSON, six digits each; null where there is none.
-std::string numbers(const std::vector<double>& values) {
-  std::string text = "[";
-  for (const double value : values) {
-    if (text.size() > 1) text += ',';
-    text += std::isfinite(value) ? fmt::format("{:.6g}", value) : "null";
-  }
-  return text + ']';
-}
 
 double number_in(const proto::VariableRecord& record, int i) {
   if (i < record.integer_size()) return static_cast<double>(record.integer(i));
@@ -72,8 +58,9 @@ int place_of(const proto::VariableRecord& record, std::uint32_t robot) {
 
 }  // namespace
 
-RecordedCurves::RecordedCurves(recorder::Reader& reader, const recorder::StateIndex& index)
-    : reader_(reader), index_(index) {
+RecordedCurves::RecordedCurves(recorder::Reader& reader, const recorder::StateIndex& index,
+                               ResidualCurves& residuals)
+    : reader_(reader), index_(index), residuals_(residuals), own_variables_(reader, index) {
   const proto::RecordingHeader& header = reader_.header();
   for (std::size_t i = 0; i < recorder::kObservables.size(); ++i) {
     const recorder::ObservableInfo& info = recorder::kObservables[i];
@@ -95,7 +82,6 @@ RecordedCurves::RecordedCurves(recorder::Reader& reader, const recorder::StateIn
     plot.title = fmt::format("{} (observable)", plot.name);
     plot.own = i;
   }
-  variables_taken_.assign(static_cast<std::size_t>(header.variable_size()), 0);
   constexpr std::array<std::array<const char*, 2>, kCounts> kCountNames{
       {{"running", "robots whose program runs"}, {"failed", "failed robots"}, {"lit", "robots with their LED on"}}};
   for (std::size_t i = 0; i < kCounts; ++i)
@@ -112,19 +98,19 @@ RecordedCurves::RecordedCurves(recorder::Reader& reader, const recorder::StateIn
     const std::string& name = header.variable(v).name();
     plots_.push_back({name, name, "", true, true, static_cast<std::uint32_t>(v), {}, {}, 0});
   }
+  if (residuals_.any()) {
+    Plot& plot = plots_.emplace_back();
+    plot.name = "residuals";
+    plot.title = "residuals of the monitor, whitened";
+    plot.of_robot = plot.residuals = true;
+  }
 }
 
 std::string RecordedCurves::list() const {
-  json plots = json::array();
-  for (const Plot& plot : plots_) {
-    plots.push_back({{"name", plot.name},
-                     {"title", plot.title},
-                     {"unit", plot.unit},
-                     {"swarm", plot.of_swarm},
-                     {"robot", plot.of_robot},
-                     {"variable", plot.variable.has_value()}});
-  }
-  return json{{"type", "plots"}, {"plots", plots}}.dump(-1, ' ', false, json::error_handler_t::replace);
+  std::vector<PlotEntry> list;
+  for (const Plot& plot : plots_)
+    list.push_back({plot.name, plot.title, plot.unit, plot.of_swarm, plot.of_robot, plot.variable.has_value(), {}});
+  return plots_text(list);
 }
 
 std::string RecordedCurves::plot(std::uint32_t number, std::optional<std::uint32_t> robot) {
@@ -138,16 +124,13 @@ std::string RecordedCurves::plot(std::uint32_t number, std::optional<std::uint32
       ((known->second.states == index_.states().size() && known->second.ended == index_.ended()) ||
        now - known->second.made < kAnswerHolds))
     return known->second.text;
-  const Curves curves = plot.variable ? of_variable(*plot.variable, robot)
-                        : plot.event  ? of_events(*plot.event, robot)
-                        : plot.own    ? of_own(*plot.own)
-                        : robot       ? of_displacement(*robot)
-                                      : of_states(plot);
-  std::string text = fmt::format(
-      "{{\"type\":\"plot\",\"plot\":{},\"robot\":{},\"whole\":{},\"names\":{},\"time\":{},\"values\":[", number,
-      robot ? std::to_string(*robot) : "null", curves.whole, json(curves.names).dump(), numbers(curves.time_s));
-  for (std::size_t i = 0; i < curves.values.size(); ++i) text += (i > 0 ? "," : "") + numbers(curves.values[i]);
-  text += "]}";
+  const Curves curves = plot.variable    ? of_variable(*plot.variable, robot)
+                        : plot.event     ? of_events(*plot.event, robot)
+                        : plot.own       ? of_own(*plot.own)
+                        : plot.residuals ? residuals_.curves(robot, kMostPoints)
+                        : robot          ? of_displacement(*robot)
+                                         : of_states(plot);
+  std::string text = plot_text(number, robot, curves);
   if (answers_.size() >= kMostAnswers)
     answers_.erase(std::min_element(answers_.begin(), answers_.end(),
                                     [](const auto& a, const auto& b) { return a.second.made < b.second.made; }));
@@ -227,7 +210,7 @@ bool RecordedCurves::take_states() {
       });
 }
 
-RecordedCurves::Curves RecordedCurves::of_states(const Plot& plot) {
+Curves RecordedCurves::of_states(const Plot& plot) {
   Curves curves;
   curves.whole = take_states();
   curves.names = {"value"};
@@ -239,33 +222,17 @@ RecordedCurves::Curves RecordedCurves::of_states(const Plot& plot) {
   return curves;
 }
 
-/// Hands variables up to a tick to the observables. Ticks ascend from call to call.
-void RecordedCurves::take_variables_until(std::int64_t tick) {
-  for (std::size_t v = 0; v < variables_taken_.size(); ++v) {
-    const std::vector<recorder::StateIndex::Entry>& all = index_.variable(v);
-    const auto end = std::upper_bound(all.begin(), all.end(), tick,
-                                      [](std::int64_t wanted, const auto& entry) { return wanted < entry.tick; });
-    const auto until = static_cast<std::size_t>(end - all.begin());
-    std::size_t at = std::max(variables_taken_[v], until - std::min(until, kMostValueRecords));
-    for (; at < until; ++at) {
-      const proto::Record* const record = record_at(all[at].offset);
-      if (record != nullptr && record->has_variable()) own_->take(record->variable());
-    }
-    variables_taken_[v] = std::max(variables_taken_[v], until);
-  }
-}
-
 bool RecordedCurves::take_own() {
   // What variables say of the last ticks may still come.
   std::int64_t settled = index_.states().back().tick;
-  for (std::size_t v = 0; v < variables_taken_.size() && !index_.ended(); ++v) {
+  for (std::size_t v = 0; v < static_cast<std::size_t>(reader_.header().variable_size()) && !index_.ended(); ++v) {
     const std::vector<recorder::StateIndex::Entry>& all = index_.variable(v);
     settled = std::min(settled, all.empty() ? -1 : all.back().tick - kSettled_ticks);
   }
   return each_new_state(
       own_values_, index_.states().size(), settled, [this](std::size_t number, const proto::StateRecord& read) {
         const proto::StateRecord state = read;  // reading variables takes the reader's memory
-        take_variables_until(state.tick());
+        own_variables_.take(state.tick(), *own_);
         const double time_s = seconds(state.tick());
         own_observer_.add(time_s, recorder::values(state.x_mm()), recorder::values(state.y_mm()),
                           recorder::values(state.heading_rad()), recorder::values(state.movable_x_mm()),
@@ -274,7 +241,7 @@ bool RecordedCurves::take_own() {
       });
 }
 
-RecordedCurves::Curves RecordedCurves::of_own(std::size_t number) {
+Curves RecordedCurves::of_own(std::size_t number) {
   Curves curves;
   curves.whole = take_own();
   curves.names = {"value"};
@@ -294,7 +261,7 @@ bool RecordedCurves::take_places(Points& points, std::uint32_t robot, std::size_
       });
 }
 
-RecordedCurves::Curves RecordedCurves::of_displacement(std::uint32_t robot) {
+Curves RecordedCurves::of_displacement(std::uint32_t robot) {
   Points& points = points_of(Curve::kPath, 0, robot);
   Curves curves{{}, {"value"}, {{}}};
   curves.whole = take_places(points, robot, index_.states().size());
@@ -356,7 +323,7 @@ std::array<double, 3> RecordedCurves::values_at(std::span<const recorder::StateI
   return {count > 0 ? sum / static_cast<double>(count) : kNothing, least, largest};
 }
 
-RecordedCurves::Curves RecordedCurves::of_variable(std::uint32_t variable, std::optional<std::uint32_t> robot) {
+Curves RecordedCurves::of_variable(std::uint32_t variable, std::optional<std::uint32_t> robot) {
   using Entry = recorder::StateIndex::Entry;
   const std::vector<Entry>& all = index_.variable(variable);
   // Records of one tick belong together: an entry's offset is the position of the first one here.
@@ -392,7 +359,7 @@ RecordedCurves::EventCounts& RecordedCurves::counts_of(std::uint32_t kind, std::
 }
 
 /// The number of events so far. Every event counts, also where the curve has fewer points.
-RecordedCurves::Curves RecordedCurves::of_events(std::uint32_t kind, std::optional<std::uint32_t> robot) {
+Curves RecordedCurves::of_events(std::uint32_t kind, std::optional<std::uint32_t> robot) {
   const std::vector<recorder::StateIndex::Entry>& all = index_.events(kind);
   EventCounts& counts = counts_of(kind, robot);
   std::vector<std::uint64_t>& up_to = counts.up_to;

@@ -20,16 +20,17 @@
 #include "clients/recorder/reader.hpp"
 #include "clients/recorder/state_index.hpp"
 #include "clients/recorder/swarm_observables.hpp"
+#include "clients/recorder/variables_until.hpp"
+#include "clients/view/curves.hpp"
+#include "clients/view/residual_curves.hpp"
 
 namespace kilotwin::view {
 
-inline constexpr std::size_t kMostPoints = 1000;
-
 class RecordedCurves {
  public:
-  /// Both must outlive this object, and the caller calls it from one thread at a time. An expression that cannot be read is left
+  /// All must outlive this object, and the caller calls it from one thread at a time. An expression that cannot be read is left
   /// out, with all others.
-  RecordedCurves(recorder::Reader& reader, const recorder::StateIndex& index);
+  RecordedCurves(recorder::Reader& reader, const recorder::StateIndex& index, ResidualCurves& residuals);
 
   /// A message of type "plots": what can be plotted, of the swarm and of single robots. Plots have numbers from 0.
   [[nodiscard]] std::string list() const;
@@ -52,12 +53,7 @@ class RecordedCurves {
     std::optional<std::uint32_t> variable, event;  ///< else a number of the swarm per state
     std::optional<std::size_t> own;                ///< an observable of the experiment
     std::size_t number = 0;                        ///< index of it
-  };
-  struct Curves {
-    std::vector<double> time_s;
-    std::vector<std::string> names;
-    std::vector<std::vector<double>> values;  ///< per name
-    bool whole = true;                        ///< false: the next answer has more
+    bool residuals = false;                        ///< of the monitor
   };
   struct Answer {
     std::string text;
@@ -96,7 +92,6 @@ class RecordedCurves {
                                                 std::optional<std::uint32_t> robot);
   [[nodiscard]] bool take_states();
   [[nodiscard]] bool take_own();
-  void take_variables_until(std::int64_t tick);
   [[nodiscard]] Curves of_states(const Plot& plot);
   [[nodiscard]] Curves of_own(std::size_t number);
   [[nodiscard]] Curves of_displacement(std::uint32_t robot);
@@ -109,13 +104,14 @@ class RecordedCurves {
 
   recorder::Reader& reader_;
   const recorder::StateIndex& index_;
+  ResidualCurves& residuals_;
   std::vector<Plot> plots_;
   recorder::ObservableObserver observer_;                       // knows the first state
   std::map<std::size_t, std::array<double, kNumbers>> states_;  // by number of the state
   std::unique_ptr<recorder::SwarmObservables> own_;             // nullptr: the experiment names none
   recorder::ObservableObserver own_observer_;
   std::map<std::size_t, std::vector<double>> own_values_;  // by number of the state
-  std::vector<std::size_t> variables_taken_;               // per variable: entries of the index that own_ knows
+  recorder::VariablesUntil own_variables_;                 // that own_ knows
   std::list<KnownPoints> points_;                          // the one that was used last is the first
   std::map<std::pair<std::uint32_t, std::int64_t>, Answer> answers_;
   std::list<EventCounts> event_counts_;  // the one that was used last is the first

@@ -77,7 +77,8 @@ class RecordedRun : public Answers {
   mutable std::mutex mutex_;  // the gateway's thread answers, another one looks whether the recording grows
   recorder::Reader reader_;
   recorder::StateIndex index_;
-  RecordedCurves curves_{reader_, index_};
+  ResidualCurves residuals_{reader_.path().parent_path()};
+  RecordedCurves curves_{reader_, index_, residuals_};
   RobotMessages messages_{reader_, index_};
   std::filesystem::path logs_of_;  // the run directory; empty: the recording stands alone
   std::unique_ptr<const proto::Experiment> experiment_;

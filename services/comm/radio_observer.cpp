@@ -27,11 +27,16 @@ class FirmwareMemory final : public ProgramMemory {
 }  // namespace
 
 RadioObserver::RadioObserver(const RunPlan& plan, RadioEngine& engine)
-    : engine_(engine), events_(plan), sampler_(plan, {0, plan.robots()}, true), tick_length_(plan.tick_length) {
+    : engine_(engine),
+      events_(plan),
+      sampler_(plan, {0, plan.robots()}, true),
+      counters_(plan),
+      tick_length_(plan.tick_length) {
   engine.log_messages(events_.sent, events_.received);
 }
 
 void RadioObserver::at(Tick now, proto::Observations& to) const {
+  counters_.sample(now, engine_.radio_counts(), to);
   if (!sampler_.any() || engine_.firmware() == nullptr) return;
   const FirmwareRobots& robots = *engine_.firmware();
   sampler_.sample(

@@ -1,9 +1,10 @@
-/// RadioObserver: what the radio observes for the recording: messages sent and received, and variables of firmware robots. It
-/// changes no result.
+/// RadioObserver: what the radio observes for the recording: messages sent and received, counters, and variables of
+/// firmware robots. It changes no result.
 #pragma once
 
 #include "core/observations/events.hpp"
 #include "core/observations/variable_sampler.hpp"
+#include "services/comm/radio_counters.hpp"
 #include "services/comm/radio_engine.hpp"
 
 namespace kilotwin::comm {
@@ -22,6 +23,7 @@ class RadioObserver {
   const RadioEngine& engine_;
   const RecordedEvents events_;
   const VariableSampler sampler_;
+  const CounterSampler counters_;
   const TickLength tick_length_;
 };
 

@@ -1,5 +1,6 @@
 """The package against the program: PROGRAM SOURCES are the arguments."""
 
+import gc
 import importlib.util
 import os
 import shutil
@@ -8,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import warnings
 from pathlib import Path
 
 PROGRAM, SOURCES = sys.argv[1], Path(sys.argv[2])
@@ -359,4 +361,12 @@ class Package(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])
+    # What is left open is told when it is collected, where no test can catch it.
+    left_open = []
+    sys.unraisablehook = left_open.append
+    warnings.simplefilter("error", ResourceWarning)
+    done = unittest.main(argv=sys.argv[:1], exit=False, warnings="")
+    gc.collect()
+    for told in left_open:
+        print(f"left open: {told.exc_value} in {told.object!r}", file=sys.stderr)
+    sys.exit(not done.result.wasSuccessful() or bool(left_open))

@@ -188,6 +188,9 @@ class MonitoredRun : public testing::Test {
     run({"replay", scratch_ / "run", "--verify"});
     run({"replay", scratch_ / "run", "--monitor"});
     EXPECT_EQ(read(scratch_ / "run/alarms.csv"), read(scratch_ / "run/alarms-replayed.csv"));
+    const std::string residuals = read(scratch_ / "run/residuals.csv");
+    EXPECT_EQ(residuals, read(scratch_ / "run/residuals-replayed.csv"));
+    EXPECT_GT(std::count(residuals.begin(), residuals.end(), '\n'), kRobots * (kDuration_s - 20));
   }
 
   Scratch scratch_;

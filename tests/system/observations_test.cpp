@@ -283,6 +283,45 @@ TEST_F(Observations, MistakesAreNamedWithTheirPlace) {
   }
 }
 
+TEST_F(Observations, CountersOfTheRadioAreVariables) {
+  constexpr std::array kNames{"attempted", "sent", "received", "collided", "backed_off"};
+  std::string experiment = std::string(kCountingExperiment) + "recording {\n";
+  for (const char* name : kNames)
+    experiment += std::string("  variable { name: \"radio_") + name + "\" every_s: 1 }\n";
+  experiment += "}\nobservable { name: \"lost\" value: \"sum(radio_collided)\" }\n";
+  write(scratch_.path() / "counted.txtpb", experiment);
+  run({scratch_ / "counted.txtpb", "--mode", "local"}, scratch_, "local");
+  run({scratch_ / "counted.txtpb"}, scratch_, "federated");
+  const std::string csv = exported("local", "--variables");
+  EXPECT_EQ(csv, exported("federated", "--variables"));
+  const Table table = table_of(csv);
+  ASSERT_EQ(table.size(), 9u * 6);
+  // They ascend, and end at the counts of the whole run.
+  const auto summary = nlohmann::json::parse(read(scratch_.path() / "local/summary.json"));
+  std::map<std::string, std::map<std::string, std::uint64_t>> at;  // by counter and robot
+  for (const auto& row : table) {
+    for (const char* name : kNames) {
+      std::uint64_t& before = at[name][row.at("robot")];
+      const std::uint64_t now = std::stoull(row.at(std::string("radio_") + name));
+      EXPECT_GE(now, before);
+      before = now;
+    }
+  }
+  for (const char* name : {"attempted", "sent", "received", "collided"}) {
+    std::uint64_t sum = 0;
+    for (const auto& [robot, count] : at[name]) sum += count;
+    EXPECT_GT(sum + (name == std::string("collided") ? 1 : 0), 0u) << name;
+    EXPECT_LE(sum, summary.at("messages").at(name).get<std::uint64_t>()) << name;
+  }
+  write(scratch_.path() / "taken.c", std::string("int radio_sent;\n") + kCountingProgram);
+  std::string taken = experiment;
+  taken.replace(taken.find("observed.c"), 10, "taken.c");
+  write(scratch_.path() / "taken.txtpb", taken);
+  const Outcome outcome = kilotwin({"check", scratch_ / "taken.txtpb"}, scratch_);
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("radio_sent is a counter of the radio"), std::string::npos) << outcome.err;
+}
+
 TEST_F(Observations, FirmwareRobotsHaveVariablesToo) {
   write(scratch_.path() / "avr.txtpb",
         std::string(kCountingExperiment) +

@@ -22,7 +22,7 @@ export class LiveCurves {
 
   constructor() {
     const source = (name: string, title: string, unit: string, value: () => number | null): Source =>
-      ({ name, title, unit, swarm: true, robot: false, variable: false, value });
+      ({ name, title, unit, swarm: true, robot: false, variable: false, absent: "", value });
     this.sources = [
       source("msd", "mean square displacement since opening", "mm²", () => this.#displacement()),
       source("running", "robots whose program runs", "", () => this.#count((state) => lifeOf(state) === LIFE_RUNNING)),

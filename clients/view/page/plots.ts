@@ -89,7 +89,7 @@ export class Plots {
 
   /** What the gateway can give. */
   list(plots: PlotInfo[]): void {
-    if (plots.length === this.#recorded.length) return;
+    if (JSON.stringify(plots) === JSON.stringify(this.#recorded)) return;
     this.#recorded = plots;
     this.#offer();
   }
@@ -135,7 +135,7 @@ export class Plots {
     }
     for (const slot of this.#slots) {
       if (slot.key.startsWith("l")) this.#showLive(slot);
-      else if (slot.key !== "" && this.#isDue(slot, now, goesOn)) this.#ask(slot, now);
+      else if (slot.key !== "" && this.#absent(slot) === "" && this.#isDue(slot, now, goesOn)) this.#ask(slot, now);
     }
     const moved = time !== this.#now;
     this.#now = time;
@@ -193,7 +193,12 @@ export class Plots {
     [slot.asked, slot.waiting, slot.growing, slot.shape] = [-Infinity, false, false, ""];
     slot.plot?.destroy();
     slot.plot = undefined;
-    this.#explain(slot, key === "" ? "nothing to plot yet" : "");
+    this.#explain(slot, key === "" ? "nothing to plot yet" : this.#absent(slot));
+  }
+
+  /** Why what is chosen has no curve; empty: it has one. */
+  #absent(slot: Slot): string {
+    return slot.key.startsWith("l") ? "" : (this.#recorded[Number(slot.key.slice(1))]?.absent ?? "");
   }
 
   #explain(slot: Slot, words: string): void {
@@ -231,8 +236,10 @@ export class Plots {
   }
 
   #firstChoice(slot: number, keys: string[]): string {
-    const plots = this.#recorded.length > 0 ? this.#recorded : this.#live.sources;
-    const letter = this.#recorded.length > 0 ? "s" : "l";
+    // Without its recording, a live run has the experiment's observables alone from the gateway.
+    const isRecorded = this.#recorded.some((plot) => plot.name === "msd");
+    const plots = isRecorded ? this.#recorded : this.#live.sources;
+    const letter = isRecorded ? "s" : "l";
     const found = FIRST_CHOICE.flatMap((name) => {
       const number = plots.findIndex((plot) => (name === "V" ? plot.variable : plot.name === name && !plot.variable));
       return number >= 0 && keys.includes(`${letter}${number}`) ? [`${letter}${number}`] : [];

@@ -112,6 +112,8 @@ export interface PlotInfo {
   swarm: boolean;
   robot: boolean;
   variable: boolean;
+  /** Why it has no curve; empty: it has one. */
+  absent: string;
 }
 
 /** One plot of the list: columns of `values` have an entry per entry of `time`, s. */

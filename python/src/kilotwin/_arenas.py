@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import math
 import mmap
 import os
-import subprocess
-import tempfile
 import warnings
-import weakref
 from typing import Any, Iterable, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kilotwin._program import KilotwinError, common_words, program, text_of
-from kilotwin._requests import ask, end_of_process, notes
+from kilotwin._requests import Answering
 
 
 class Arenas:
@@ -62,18 +59,10 @@ class Arenas:
             words += ["--variable", name]
         if threads is not None:
             words += ["--threads", str(threads)]
-        # A session of its own: Ctrl-C is for Python, which ends the arenas when it ends.
-        self._said = tempfile.TemporaryFile("w+")
-        self._process = subprocess.Popen(
-            words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said, text=True, start_new_session=True
-        )
-        self._closed = weakref.finalize(self, end_of_process, self._process)
-        line = self._process.stdout.readline()  # type: ignore[union-attr]
-        if not line:
-            raise self._end_of_process()
-        for note in self._notes():
+        self._requests = Answering(words, "the arenas have ended with status {}")
+        about = self._requests.first()
+        for note in self._requests.notes():
             warnings.warn(note, stacklevel=2)
-        about = json.loads(line)
         #: Number of arenas.
         self.count: int = about["arenas"]
         #: Number of robots in each arena.
@@ -86,103 +75,103 @@ class Arenas:
         self.variables: tuple[str, ...] = tuple(about["variables"])
         with open(about["memory"], "r+b") as file:
             memory = mmap.mmap(file.fileno(), about["octets"])
-        self._arrays: dict[str, np.ndarray] = {}
+        self._arrays: dict[str, NDArray[Any]] = {}
         for name, array in about["arrays"].items():
-            made = np.ndarray(array["shape"], array["type"], memory, array["offset"])
+            made: NDArray[Any] = np.ndarray(array["shape"], array["type"], memory, array["offset"])
             made.flags.writeable = name == "wanted"
             self._arrays[name] = made
         self._seeds: list[int] = about["seeds"]
 
     # What the arenas show.
 
-    def _view(self, array: np.ndarray) -> np.ndarray:
+    def _view(self, array: NDArray[Any]) -> NDArray[Any]:
         return array
 
     @property
-    def tick(self) -> np.ndarray:
+    def tick(self) -> NDArray[Any]:
         """int64, (arenas,): ticks since the beginning."""
         return self._view(self._arrays["tick"])
 
     @property
-    def time_s(self) -> np.ndarray:
+    def time_s(self) -> NDArray[Any]:
         """float64, (arenas,): simulated time, s."""
         return self.tick * self.tick_s
 
     @property
-    def ended(self) -> np.ndarray:
+    def ended(self) -> NDArray[Any]:
         """uint8, (arenas,): 1 where the experiment's duration is over; such an arena steps no more until it is reset."""
         return self._view(self._arrays["ended"])
 
     @property
-    def state_hash(self) -> np.ndarray:
+    def state_hash(self) -> NDArray[Any]:
         """uint64, (arenas,): as in the summary of a run that ends here."""
         return self._view(self._arrays["state_hash"])
 
     @property
-    def robots_failed(self) -> np.ndarray:
+    def robots_failed(self) -> NDArray[Any]:
         """uint32, (arenas,): robots whose program has failed; failures() tells why."""
         return self._view(self._arrays["robots_failed"])
 
     @property
-    def sent(self) -> np.ndarray:
+    def sent(self) -> NDArray[Any]:
         """uint64, (arenas,): messages that robots have sent."""
         return self._view(self._arrays["sent"])
 
     @property
-    def received(self) -> np.ndarray:
+    def received(self) -> NDArray[Any]:
         """uint64, (arenas,): messages that robots have received."""
         return self._view(self._arrays["received"])
 
     @property
-    def x_mm(self) -> np.ndarray:
+    def x_mm(self) -> NDArray[Any]:
         """float64, (arenas, robots): place, mm from the arena's centre."""
         return self._view(self._arrays["x_mm"])
 
     @property
-    def y_mm(self) -> np.ndarray:
+    def y_mm(self) -> NDArray[Any]:
         """float64, (arenas, robots): place, mm from the arena's centre."""
         return self._view(self._arrays["y_mm"])
 
     @property
-    def heading_rad(self) -> np.ndarray:
+    def heading_rad(self) -> NDArray[Any]:
         """float64, (arenas, robots): anticlockwise from x, in [-pi, pi)."""
         return self._view(self._arrays["heading_rad"])
 
     @property
-    def led(self) -> np.ndarray:
+    def led(self) -> NDArray[Any]:
         """uint8, (arenas, robots, 3): red, green, blue, each 0 to 3."""
         return self._view(self._arrays["led"])
 
     @property
-    def motors(self) -> np.ndarray:
+    def motors(self) -> NDArray[Any]:
         """uint8, (arenas, robots, 2): left and right, 0 to 255."""
         return self._view(self._arrays["motors"])
 
     @property
-    def life_cycle(self) -> np.ndarray:
+    def life_cycle(self) -> NDArray[Any]:
         """uint8, (arenas, robots): 0 asleep, 1 idle, 2 running... as in idl/public.idl."""
         return self._view(self._arrays["life_cycle"])
 
     @property
-    def body_x_mm(self) -> np.ndarray:
+    def body_x_mm(self) -> NDArray[Any]:
         """float64, (arenas, bodies): place of movable bodies, mm from the arena's centre."""
         return self._view(self._arrays["body_x_mm"])
 
     @property
-    def body_y_mm(self) -> np.ndarray:
+    def body_y_mm(self) -> NDArray[Any]:
         """float64, (arenas, bodies): place of movable bodies, mm from the arena's centre."""
         return self._view(self._arrays["body_y_mm"])
 
     @property
-    def body_heading_rad(self) -> np.ndarray:
+    def body_heading_rad(self) -> NDArray[Any]:
         """float64, (arenas, bodies): anticlockwise from x."""
         return self._view(self._arrays["body_heading_rad"])
 
-    def variable(self, name: str) -> np.ndarray:
+    def variable(self, name: str) -> NDArray[Any]:
         """float64, (arenas, robots): a variable of the programs; NaN where a robot's program has none of that name."""
         return self._view(self._arrays["variables"][self._index_of(name)])
 
-    def observe(self) -> dict[str, np.ndarray]:
+    def observe(self) -> dict[str, NDArray[Any]]:
         """Copies of all arrays, by their names, those of variables included. They stay as they are."""
         names = [name for name in self._arrays if name not in ("variables", "wanted")]
         copies = {name: np.array(self._view(self._arrays[name])) for name in names}
@@ -249,11 +238,12 @@ class Arenas:
 
     def failures(self) -> list[dict[str, Any]]:
         """Robots whose program has failed: arena, robot and why."""
-        return self._ask({"failures": True})["failures"]
+        failures: list[dict[str, Any]] = self._ask({"failures": True})["failures"]
+        return failures
 
     def close(self) -> None:
         """Ends the arenas. Arrays that were taken from them stay as they are."""
-        self._closed()
+        self._requests.close()
 
     def __enter__(self) -> Arenas:
         return self
@@ -271,23 +261,10 @@ class Arenas:
             known = ", ".join(self.variables) or "none; name some as variables=[...]"
             raise KeyError(f"there is no variable {name}; there are: {known}") from None
 
-    def _ask(self, request: dict[str, Any]) -> Any:
-        if not self._closed.alive:
+    def _ask(self, request: dict[str, Any]) -> dict[str, Any]:
+        if not self._requests.close.alive:
             raise KilotwinError("the arenas are closed", 1)
-        answer = ask(self._process, request)
-        if answer is None:
-            raise self._end_of_process()
-        return answer
-
-    def _notes(self) -> list[str]:
-        """What the process has said to people."""
-        return notes(self._said)
-
-    def _end_of_process(self) -> KilotwinError:
-        """Why the process has ended."""
-        self._closed()
-        status = self._process.returncode
-        return KilotwinError((self._notes() or [f"the arenas have ended with status {status}"])[-1], status)
+        return self._requests.ask(request)
 
 
 class Arena(Arenas):
@@ -297,5 +274,6 @@ class Arena(Arenas):
         """Options as for Arenas."""
         super().__init__(experiment, 1, **options)
 
-    def _view(self, array: np.ndarray) -> np.ndarray:
-        return array[0]
+    def _view(self, array: NDArray[Any]) -> NDArray[Any]:
+        view: NDArray[Any] = array[0]
+        return view

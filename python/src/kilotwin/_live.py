@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import tempfile
-import weakref
 from typing import Any
 
 import numpy as np
 
 from kilotwin._program import KilotwinError, program
-from kilotwin._requests import ask, end_of_process, notes
+from kilotwin._requests import Answering
 
 
 class Live:
@@ -30,22 +26,11 @@ class Live:
 
     def __init__(self, domain: int = 0, *, patience_s: float = 10.0) -> None:
         """`domain`: DDS domain of the run. Every call raises KilotwinError where the run has not followed within `patience_s`."""
-        self._said = tempfile.TemporaryFile("w+")
-        self._process = subprocess.Popen(
+        self._requests = Answering(
             [program(), "control", "requests", "--domain", str(domain), "--patience", str(patience_s)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._said,
-            text=True,
-            start_new_session=True,
+            "kilotwin control has ended with status {}",
         )
-        self._closed = weakref.finalize(self, end_of_process, self._process)
-        line = self._process.stdout.readline()  # type: ignore[union-attr]
-        if not line:
-            self._closed()
-            said = notes(self._said)
-            raise KilotwinError((said or ["there is no run"])[-1], self._process.returncode)
-        self._first: dict[str, Any] = json.loads(line)
+        self._first: dict[str, Any] = self._requests.first()
         #: Name of the experiment.
         self.name: str = self._first["name"]
         #: Number of robots.
@@ -91,7 +76,7 @@ class Live:
 
     def close(self) -> None:
         """Leaves the run, which goes on."""
-        self._closed()
+        self._requests.close()
 
     def __enter__(self) -> Live:
         return self
@@ -102,15 +87,10 @@ class Live:
     def __repr__(self) -> str:
         return f"<kilotwin.Live: {self.name}, {self.robots} robots>"
 
-    def _ask(self, request: dict[str, Any]) -> Any:
-        if not self._closed.alive:
+    def _ask(self, request: dict[str, Any]) -> dict[str, Any]:
+        if not self._requests.close.alive:
             raise KilotwinError("the run has been left", 1)
-        answer = ask(self._process, request)
-        if answer is None:
-            self._closed()
-            status = self._process.returncode
-            raise KilotwinError((notes(self._said) or [f"kilotwin control has ended with status {status}"])[-1], status)
-        return answer
+        return self._requests.ask(request)
 
 
 def join(domain: int = 0, *, patience_s: float = 10.0) -> Live:

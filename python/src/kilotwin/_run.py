@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import tempfile
+import weakref
 from pathlib import Path
 from typing import Any, Mapping
 
@@ -20,7 +22,9 @@ class Run:
         #: The run directory.
         self.directory = Path(directory)
         self._tables: dict[tuple[str, ...], Table] = {}
-        self._scratch = tempfile.TemporaryDirectory(prefix="kilotwin-")
+        # Tables are exported there. It goes with this object; tables that were read keep their files open.
+        self._scratch = tempfile.mkdtemp(prefix="kilotwin-")
+        weakref.finalize(self, shutil.rmtree, self._scratch, ignore_errors=True)
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -36,7 +40,7 @@ class Run:
     def _table(self, option: str, *more: str) -> Table:
         key = (option, *more)
         if key not in self._tables:
-            file = Path(self._scratch.name) / f"{len(self._tables)}.npz"
+            file = Path(self._scratch) / f"{len(self._tables)}.npz"
             call(["export", str(self.directory), option, str(file), *more])
             self._tables[key] = Table(file)
         return self._tables[key]

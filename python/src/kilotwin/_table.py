@@ -8,12 +8,13 @@ import zipfile
 from typing import TYPE_CHECKING, Any, Iterator, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     import pandas
 
 
-class Table(Mapping[str, np.ndarray]):
+class Table(Mapping[str, NDArray[Any]]):
     """Columns by name, each an array of shape (rows,). A column is read when it is first used.
 
     Whole numbers are int64, or float64 where a value is missing; other numbers are float64 with NaN for missing values; texts are
@@ -22,7 +23,7 @@ class Table(Mapping[str, np.ndarray]):
 
     def __init__(self, file: str | os.PathLike[str]) -> None:
         self._arrays: Any = np.load(file)
-        self._read: dict[str, np.ndarray] = {}
+        self._read: dict[str, NDArray[Any]] = {}
         with zipfile.ZipFile(file) as archive:
             about = json.loads(archive.comment)
             # With very many columns, only the arrays' own comments describe them.
@@ -32,7 +33,7 @@ class Table(Mapping[str, np.ndarray]):
         #: Where the table comes from: experiment, seed, run, state_hash, version, build, date.
         self.about: dict[str, str] = about
 
-    def __getitem__(self, column: str) -> np.ndarray:
+    def __getitem__(self, column: str) -> NDArray[Any]:
         if column not in self._read:
             if column not in self.units:
                 raise KeyError(f"no column {column!r}; there are {', '.join(self.units)}")

@@ -113,6 +113,23 @@ TEST(Monitor, AMotorThatFailsIsNamed) {
   EXPECT_GT(alarms[0].time_s, 90);
   EXPECT_LT(alarms[0].time_s, 110);
   EXPECT_NEAR(alarms[0].sizes[0].value, -1, 0.5);
+  // Seconds of whole length, by time and robot; near 1 but for the faulty robot, from its failure on.
+  double worst = 0, others = 0, before = 0;
+  std::pair<double, std::uint32_t> last{0, 0};
+  std::size_t rows = 0, rows_before = 0;
+  for (const Residual& residual : arena.monitor().take_residuals()) {
+    const std::pair<double, std::uint32_t> at{residual.to_s, residual.robot};
+    EXPECT_LT(last, at);
+    last = at;
+    const double mean_square = residual.squares / (2 * residual.samples + residual.headings);
+    if (residual.robot == 3 && residual.to_s > 90) worst = std::max(worst, mean_square);
+    if (residual.robot == 3 && residual.to_s <= 90) before += mean_square, ++rows_before;
+    if (residual.robot != 3) others += mean_square, ++rows;
+  }
+  EXPECT_EQ(last.first, 129);
+  EXPECT_GT(worst, 2);  // 90 components: the standard deviation is 0.15 under the model
+  EXPECT_NEAR(before / static_cast<double>(rows_before), 1, 0.15);
+  EXPECT_NEAR(others / static_cast<double>(rows), 1, 0.1);
   RecordProperty("delay_ms", static_cast<int>(1e3 * (alarms[0].time_s - 90)));
 }
 

@@ -8,6 +8,7 @@
 
 #include "core/base/error.hpp"
 #include "core/csv/csv_reader.hpp"
+#include "core/os/process.hpp"
 #include "tests/clients/recorder/synthetic.hpp"
 
 namespace kilotwin::recorder {
@@ -225,6 +226,22 @@ TEST(Export, PogosimsTableHasItsColumnsAndItsOrigin) {
   header.add_group_robots(1);
   header.add_group_robots(1);
   EXPECT_EQ(exported("two.ktrec").at(2), "0,robots-1,1,1250.0000,500.0000,-3.000000");
+}
+
+TEST(Export, PogosimsFeatherFileIsReadByArrow) {
+  const Scratch scratch;
+  write_synthetic(scratch / "r.ktrec", synthetic_header(2), 31);
+  Reader reader(scratch / "r.ktrec");
+  export_pogosim(reader, scratch / "p.csv");
+  reader.rewind();
+  export_pogosim(reader, scratch / "p.feather");
+  const std::filesystem::path node = os::find_executable("node");
+  if (node.empty()) GTEST_SKIP() << "node is not installed";
+  const os::ProcessResult result =
+      os::run_process({node, KILOTWIN_SOURCES "/tests/clients/recorder/pogosim_test.mjs", scratch / "p.feather",
+                       scratch / "p.csv", KILOTWIN_SOURCES "/build/npm"});
+  if (result.end.code == 77) GTEST_SKIP() << "build/npm has no apache-arrow; scripts/setup installs it";
+  EXPECT_TRUE(result.end.well()) << result.errors;
 }
 
 TEST(Export, TablesWhoseNameEndsInGzAreGzipped) {

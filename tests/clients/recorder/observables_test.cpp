@@ -8,6 +8,7 @@
 
 #include "clients/recorder/statistics.hpp"
 #include "tests/clients/recorder/synthetic.hpp"
+#include "tests/clients/view/recordings.hpp"
 
 namespace kilotwin::recorder {
 namespace {
@@ -48,6 +49,25 @@ TEST(Observables, OfGroupsComeWithThoseOfAll) {
   EXPECT_EQ(observed[0].of(Observable::kSpread), observe(again).of(Observable::kSpread));
   EXPECT_NEAR(observed[1].of(Observable::kDisplacement)[2], 62 * (0.5 + std::hypot(0.5, 0.25)) / 2, 1e-9);
   EXPECT_NEAR(observed[2].of(Observable::kDisplacement)[2], 62 * std::hypot(0.5, 0.5), 1e-9);
+}
+
+TEST(Observables, OfSomeStatesAreThoseOfAllAtTheseStates) {
+  const Scratch scratch;
+  test::write_circling(scratch / "r.ktrec", {.robots = 12, .states = 30, .inside = true, .observables = true});
+  Reader reader(scratch / "r.ktrec"), again(scratch / "r.ktrec");
+  StateIndex index(scratch / "r.ktrec");
+  ASSERT_TRUE(index.update());
+  const ObservableCurves all = observe(reader), some = observe_every(again, index, 7);
+  // States 0, 7, 14, 21, 28, and the last one.
+  ASSERT_EQ(some.time_s.size(), 6u);
+  ASSERT_EQ(some.own.size(), 2u);
+  for (std::size_t i = 0; i < 6; ++i) {
+    const std::size_t at = std::min<std::size_t>(7 * i, 29);
+    EXPECT_EQ(some.time_s[i], all.time_s[at]);
+    EXPECT_EQ(some.of(Observable::kNearest)[i], all.of(Observable::kNearest)[at]);
+    for (std::size_t own = 0; own < 2; ++own)
+      EXPECT_EQ(some.own[own].value[i], all.own[own].value[at]) << all.own[own].name << " " << at;
+  }
 }
 
 TEST(Observables, PolarisationIsOneForACommonDirectionAndZeroForNone) {

@@ -1,6 +1,6 @@
 // node page_test.mjs KILOTWIN VIEW SAMPLES NPM SOURCES [PICTURES]: the page in headless Chromium, as people use it.
 import assert from "node:assert/strict";
-import { execFileSync } from "node:child_process";
+import { execFileSync, spawn } from "node:child_process";
 import fs from "node:fs";
 import path from "node:path";
 import { eventually } from "./browser.mjs";
@@ -184,7 +184,8 @@ function talkingExperiment() {
   fs.writeFileSync(experiment, `duration_s: 600 seed: 5 arena { width_mm: 2000 height_mm: 2000 }
     robots { count: 100 behaviour: "talk.c" layout { grid { pitch_mm: 60 } } }
     recording { every_s: 0.5 variable { name: "rounds" every_s: 0.5 } }
-    observable { name: "mean_rounds" value: "mean(rounds)" }`);
+    observable { name: "mean_rounds" value: "mean(rounds)" }
+    observable { name: "awake" value: "share(state == running)" }`);
   return experiment;
 }
 
@@ -199,6 +200,8 @@ async function plotsAndPrograms() {
   const talked = path.join(scratch, "talked");
   execFileSync(kilotwin, ["run", talkingExperiment(), "--duration", "30", "--mode", "local", "--quiet", "--out", talked]);
   fs.writeFileSync(path.join(talked, "alarms.txt"), "monitor: 12.0 s: robot 2 <b>leaves</b> the model\nmonitor: 25.0 s: robot 4 leaves the model\n");
+  const residuals = Array.from({ length: 29 }, (_, i) => `${i + 1},42,30,30,30,${i + 1},-0.5,0.25,${2 * i + 2}\n`);
+  fs.writeFileSync(path.join(talked, "residuals.csv"), `time_s,robot,samples,headings,tested,along,across,heading,mean_square\n${residuals.join("")}`);
   const served = await serve([viewProgram, "view", talked]);
   const page = await open(served.address);
   await eventually("a picture", async () => (await drawn(page)) > 1);
@@ -232,6 +235,10 @@ async function plotsAndPrograms() {
   await picture(page, "plots");
   await page.locator("#plots select").nth(1).selectOption({ label: "mean_rounds (observable)" });
   await eventually("the experiment's own observable", async () => (await line(page, 2, "value")) === (await rounds()));
+  await page.locator("#plots select").nth(0).selectOption({ label: "residuals of the monitor, whitened of robot 42" });
+  await eventually("the robot's residuals", async () => (await line(page, 1, "across")) === -0.5 && (await line(page, 1, "along")) === Math.floor(await clock(page)));
+  await page.locator("#plots select").nth(0).selectOption({ label: "residuals of the monitor, whitened" });
+  await eventually("the swarm's", async () => (await line(page, 1, "mean square of all")) === 2 * Math.floor(await clock(page)));
   const plot = await page.locator("#plots .plot:nth-child(3) .u-over").boundingBox();
   await page.mouse.click(plot.x + plot.width / 2, plot.y + plot.height / 2);
   await eventually("half of the time", async () => Math.abs((await clock(page)) - 15) < 1);
@@ -361,4 +368,23 @@ async function liveRun() {
   assert.equal(await served.stop(), 0);
 }
 
-await run(recordedRun, plotsAndPrograms, lightOnTheFloor, liveRun);
+/** Without the run's directory, observables of poses, LEDs and life cycles have curves, and the others say why not. */
+async function liveRunElsewhere() {
+  const domain = String(30 + (process.pid % 30));
+  const served = await serve([viewProgram, "view", "--domain", domain]);
+  const page = await open(served.address);
+  const run = spawn(kilotwin, ["run", talkingExperiment(), "--pace", "1", "--quiet", "--domain", domain, "--out", path.join(scratch, "elsewhere")]);
+  await phase(page, "live: running");
+  await press(page, "Plots");
+  await eventually("the choice", async () => (await page.locator("#plots select").nth(0).locator("option").allTextContents()).includes("awake (observable)"));
+  await page.locator("#plots select").nth(0).selectOption({ label: "awake (observable)" });
+  await eventually("the observable", async () => (await line(page, 1, "value")) === 1);
+  await page.locator("#plots select").nth(1).selectOption({ label: "mean_rounds (observable)" });
+  await eventually("the reason", async () => /mean_rounds uses rounds, which is in the run's recording only/.test(await page.locator("#plots .plot:nth-child(2) p").textContent()));
+  run.kill("SIGINT");
+  assert.deepEqual(page.faults, []);
+  await page.close();
+  assert.equal(await served.stop(), 0);
+}
+
+await run(recordedRun, plotsAndPrograms, lightOnTheFloor, liveRun, liveRunElsewhere);

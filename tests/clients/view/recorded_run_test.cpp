@@ -14,6 +14,7 @@
 #include "clients/recorder/observables.hpp"
 #include "clients/view/flights.hpp"
 #include "clients/view/light_picture.hpp"
+#include "clients/view/live_observables.hpp"
 #include "clients/view/robot_log.hpp"
 #include "clients/view/watched_plan.hpp"
 #include "core/base/error.hpp"
@@ -481,6 +482,75 @@ TEST(RecordedRun, TellsWhatTrackersSawAndWhichPacketsCame) {
     char octets[24];
     std::snprintf(octets, sizeof octets, "%02x%016d07", sent - 1, 0);
     EXPECT_EQ(packets.back()["message"], octets);
+  }
+}
+
+TEST(ResidualCurves, FollowTheTableOfTheMonitor) {
+  Scratch scratch;
+  fs::create_directories(scratch / "run");
+  test::write_circling(scratch / "run/recording.ktrec", {.robots = 20, .states = 5});
+  const std::string header = "time_s,robot,samples,headings,tested,along,across,heading,mean_square\n";
+  // Robot 3 has 4 samples per second, robot 5 has 12 without headings.
+  std::ofstream table(scratch / "run/residuals.csv");
+  table << header << "1,3,4,4,4,1,-2,0.5,1\n1,5,12,0,0,1,1,,2\n2,3,4,4,4,3,0,0.5,1\n2,5,12,0" << std::flush;
+  RecordedRun run(scratch / "run");
+  const std::uint32_t residuals = number_of(run, "residuals");
+  const json robot = whole_plot(run, residuals, 3);
+  EXPECT_EQ(robot["names"], (json{"along", "across", "heading"}));
+  EXPECT_EQ(robot["time"], (json{1, 2}));
+  EXPECT_EQ(robot["values"], (json{{1, 3}, {-2, 0}, {0.5, 0.5}}));
+  const json swarm = whole_plot(run, residuals);
+  EXPECT_NEAR(swarm["values"][0][0].get<double>(), (12 * 1 + 24 * 2) / 36.0, 1e-5);
+  EXPECT_EQ(swarm["values"][0][1], 1) << "the row that is being written does not count";
+  table << ",12,5,5,,6\n3,5,12,0,12,0,0,,6\n" << std::flush;
+  ResidualCurves grown(scratch / "run");
+  const Curves whole = grown.curves(5, kMostPoints);
+  EXPECT_EQ(whole.values[0], (std::vector<double>{1, 5, 0}));
+  EXPECT_TRUE(std::isnan(whole.values[2][0]));
+  // Of fewer points, each stays standard normal: sums over the root of their number. Seconds 1; 2 and 3.
+  const Curves fewer = grown.curves(5, 2);
+  ASSERT_EQ(fewer.time_s, (std::vector<double>{1, 3}));
+  EXPECT_NEAR(fewer.values[0][1], 5 / std::sqrt(2.0), 1e-12);
+  EXPECT_FALSE(ResidualCurves(scratch / "none").any());
+}
+
+TEST(LiveObservables, AreOfPosesAndSayWhatTheyLack) {
+  proto::Experiment experiment;
+  experiment.add_robots()->set_count(2);
+  for (const auto& [name, value] : {std::pair{"wide", "mean(abs(x_mm))"},
+                                    {"hops", "max(hop_count) + msd"},
+                                    {"moved", "max(displacement_mm)"},
+                                    {"red", "share(led == red)"}}) {
+    proto::Observable& observable = *experiment.add_observable();
+    observable.set_name(name);
+    observable.set_value(value);
+  }
+  LiveObservables live(experiment, 2);
+  const json plots = json::parse(live.list())["plots"];
+  ASSERT_EQ(plots.size(), 4u);
+  EXPECT_EQ(plots[0]["absent"], "");
+  EXPECT_NE(plots[1]["absent"].get<std::string>().find("uses hop_count, which is in the run's recording only"),
+            std::string::npos);
+  EXPECT_EQ(plots[2]["title"], "moved (observable, motion since opening)");
+  SwarmView swarm(2, 0, 0);
+  LiveObservables::Clock::time_point now{};
+  for (int i = 0; i < 3000; ++i, now += std::chrono::hours(1)) {
+    swarm.x_mm = {-1.0 * i, 3.0 * i};
+    swarm.led = {static_cast<std::uint8_t>(i % 2 == 0 ? 3 : 0), 0};
+    live.take(i, swarm, now);
+    live.take(i + 0.5, swarm, now);  // too soon after the other
+  }
+  EXPECT_EQ(live.plot(1), "");
+  EXPECT_EQ(live.plot(4), "");
+  const json wide = json::parse(live.plot(0)), moved = json::parse(live.plot(2)), red = json::parse(live.plot(3));
+  EXPECT_LE(wide["time"].size(), kMostPoints);
+  EXPECT_GT(wide["time"].size(), kMostPoints / 2);
+  for (std::size_t i = 0; i < wide["time"].size(); ++i) {
+    const double at = wide["time"][i];
+    EXPECT_EQ(at, std::floor(at));
+    EXPECT_EQ(wide["values"][0][i], 2 * at);
+    EXPECT_EQ(moved["values"][0][i], 3 * at);
+    EXPECT_EQ(red["values"][0][i], std::fmod(at, 2) == 0 ? 0.5 : 0);
   }
 }
 
