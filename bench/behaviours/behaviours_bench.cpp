@@ -106,7 +106,7 @@ int main(int count, char** words) {
   if (mkdtemp(folder.data()) == nullptr) return 1;
   const std::string own = std::string(KILOTWIN_BEHAVIOURS) + "/disperse.c";
   for (const Case& one :
-       {Case{"disperse", own}, Case{"disperse, loop() once per tick", own, true},
+       {Case{"disperse, as on the robot", own}, Case{"disperse, loop() once per tick", own, true},
         Case{"empty loop()", "static void loop(void) {}"},
         Case{"blocked in delay()", "static void loop(void) { delay(60000); }"},
         Case{"while (!received);", "static void loop(void) { while (!received); }"},

@@ -366,7 +366,7 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
       holds_[i] = offers_[i] = 1;
     }
   }
-  keep_eeprom(i, slot);
+  if (slot.surroundings()->eeprom_written != 0) keep_eeprom(i, slot);
   note_outputs(i, robot, executor.tx_period());
   // A flash within a tick is seen as often as it lasts. The end of the tick would always miss it, as callbacks run at its beginning.
   const KtSurroundings& around = *slot.surroundings();
@@ -386,6 +386,7 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
     memory.set(program, program.file.table.robot, robot);
   else if (!memory.copy_out(slot, executor.data_octets(), thread))
     return fail_robot(i, Fault{Fault::kStackLost, 0, 0}, program, slot);
+  if (robot.loop_rate != KT_LOOP_PER_TICK) return;
   const LoopProbe& probe = probes_[plan_.program_of(share_.first + i)];
   if (probe.done < kProbes && from.count() >= probe.next) probe_loop(i, program, slot, executor);
 }
@@ -396,7 +397,7 @@ void BehavioursEngine::probe_loop(std::uint32_t i, const Program& program, const
                                   const Executor& executor) {
   LoopProbe& probe = probes_[plan_.program_of(share_.first + i)];
   const KtRobot before = executor.robot();
-  const bool rests = before.loop_rate == KT_LOOP_PER_TICK && before.debt_cycles == 0 && wait_period_[i] == 0 &&
+  const bool rests = before.debt_cycles == 0 && wait_period_[i] == 0 &&
                      before.state == static_cast<std::uint8_t>(LifeCycle::kRunning);
   if (!rests) return;
   probe.next = now_.count() + kProbePeriod;
@@ -467,7 +468,7 @@ Executor::Main BehavioursEngine::run_loops(std::uint32_t i, const Executor& exec
     all_calls += calls;
     cycles = main.left;
     if (robot.spent == 0 && exchange.log_length == printed &&
-        memory.equals(span.program, span.slot, executor.data_octets(), thread)) {
+        memory.settles(span.program, span.slot, executor.data_octets(), thread)) {
       span.kept = true;
       if (calls == 1 || used <= 0 || cycles <= 0) return main;
       // A period of several calls: only its rest at the end of the tick is still to be executed.
@@ -551,12 +552,10 @@ void BehavioursEngine::set_surroundings(std::uint32_t i, const Slot& slot, std::
 }
 
 void BehavioursEngine::keep_eeprom(std::uint32_t i, const Slot& slot) {
-  const KtSurroundings& around = *slot.surroundings();
-  if (around.eeprom_written == 0) return;
   calibrated_[i] = 0;
   if (eeprom_[i]) return;
   eeprom_[i] = std::make_unique<Eeprom>();
-  std::copy_n(around.eeprom_copy, eeprom_[i]->size(), eeprom_[i]->begin());
+  std::copy_n(slot.surroundings()->eeprom_copy, eeprom_[i]->size(), eeprom_[i]->begin());
 }
 
 /// Gives each robot without a stated EEPROM one with its own ranging table.

@@ -133,12 +133,17 @@ class BehavioursEngine {
   void say_what_was_heard();
   void run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_ticks, const Program&, const Slot&, const Executor&);
   void use_battery(std::uint32_t i);
-  void set_surroundings(std::uint32_t i, const Slot&, std::uint32_t receptions);
   void calibrate_ranging(const RadioParameters&);
   void keep_eeprom(std::uint32_t i, const Slot&);
   struct Span;
-  const Fault* run_main(std::uint32_t i, const Executor&, std::int32_t interrupted_cycles, Span&);
-  Executor::Main run_loops(std::uint32_t i, const Executor&, std::int32_t cycles, Span&);
+  // The path of a robot through its tick, in line: calls of these would take as long as their work.
+  [[gnu::always_inline]] inline void set_surroundings(std::uint32_t i, const Slot&, std::uint32_t receptions);
+  [[gnu::always_inline]] inline const Fault* run_main(std::uint32_t i, const Executor&,
+                                                      std::int32_t interrupted_cycles, Span&);
+  [[gnu::always_inline]] inline Executor::Main run_loops(std::uint32_t i, const Executor&, std::int32_t cycles,
+                                                         Span&);
+  [[gnu::always_inline]] inline void note_outputs(std::uint32_t i, KtRobot& robot, std::uint16_t tx_period);
+  [[gnu::always_inline]] inline void note_motors(std::uint32_t i, KtRobot& robot);
   [[nodiscard]] bool is_first(std::uint32_t i, Warning);
   void probe_loop(std::uint32_t i, const Program&, const Slot&, const Executor&);
   void note_overflows(std::uint32_t i, KtExchange&, const Program&, const Slot&);
@@ -150,8 +155,6 @@ class BehavioursEngine {
   void fail_robot(std::uint32_t i, std::string text);
   void fail_known_culprits(Tick from);
   void take_log(std::uint32_t i, const Slot&);
-  void note_outputs(std::uint32_t i, KtRobot& robot, std::uint16_t tx_period);
-  void note_motors(std::uint32_t i, KtRobot& robot);
   void note_calls(std::uint32_t i, std::int64_t calls);
 
   const RunPlan& plan_;

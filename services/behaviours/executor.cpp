@@ -59,30 +59,8 @@ void RobotMemory::restore(const Program& program, const Slot& slot, std::span<co
   std::memcpy(octets_.get() + data_octets_, stack.data(), stack.size());
 }
 
-bool RobotMemory::equals(const Program& program, const Slot& slot, std::uint32_t data_octets,
-                         const RobotThread& thread) const {
-  if (data_octets != data_octets_ || slot.stack_top() - thread.robot_stack != stack_octets_) return false;
-  const std::uint8_t* const now = slot.data();
-  const std::uint8_t* const then = octets_.get();
-  const auto same = [&](std::size_t first, std::size_t last) {
-    return std::memcmp(now + first, then + first, last - first) == 0;
-  };
-  const std::size_t robot = program.file.table.robot - program.file.data.first;
-  // Of the hardware: generator and outputs, but neither clocks nor counters.
-  return same(robot, robot + offsetof(KtRobot, debt_cycles)) &&
-         same(robot + offsetof(KtRobot, loop_rate), robot + offsetof(KtRobot, waits)) &&
-         same(robot + offsetof(KtRobot, full), robot + offsetof(KtRobot, looped)) &&
-         same(robot + offsetof(KtRobot, heap_octets), robot + offsetof(KtRobot, full_from)) && same(0, robot) &&
-         same(robot + sizeof(KtRobot), data_octets) &&
-         std::memcmp(reinterpret_cast<const std::uint8_t*>(thread.robot_stack), then + data_octets_,  // NOLINT
-                     stack_octets_) == 0;
-}
-
 namespace {
 
-/// Limit of a callback: one second of the robot's time. On a robot a longer callback would block all messages, the clock and the
-/// main program.
-constexpr std::int32_t kCallbackCycles = 8'000'000;
 /// A busy wait is looked for in this many slices; a slice ends at the next test of the budget.
 constexpr int kMostSlices = 24;
 /// Value of Main::wait_period for a loop with a single test. No period is that short.
@@ -166,33 +144,6 @@ void Executor::run_busy_wait(Main& main, std::int32_t previous_period) const {
     break;
   }
   if (main.left >= 0) run(main, main.left);
-}
-
-const Fault* Executor::call(std::uint64_t function, std::uint64_t& result, std::int32_t& cycles) const {
-  thread_.budget = kCallbackCycles;
-  thread_.overrun = 0;
-  clear(reinterpret_cast<std::uint8_t*>(slot_.interrupt_stack_top()) - kClearedOctets, kClearedOctets);  // NOLINT
-  begin();
-  result = call_(function);
-  end();
-  cycles += kCallbackCycles - thread_.budget;
-  if (thread_.overrun != 0) return fail({Fault::kCallbackOverrun, robot_->in_interrupt, thread_.place});
-  return fault();
-}
-
-const Fault* Executor::interrupt(std::span<const KtReception> receptions, bool sent, std::int32_t& cycles) const {
-  KtExchange& exchange = *slot_.exchange();
-  exchange.sent = sent ? 1 : 0;
-  do {
-    const auto part = receptions.first(std::min<std::size_t>(receptions.size(), KT_MOST_RECEPTIONS));
-    exchange.receptions = static_cast<std::uint32_t>(part.size());
-    std::copy(part.begin(), part.end(), exchange.reception);
-    std::uint64_t result = 0;
-    if (const Fault* const fault = call(interrupts_, result, cycles)) return fault;
-    receptions = receptions.subspan(part.size());
-    exchange.sent = 0;
-  } while (!receptions.empty() && robot_->reset == 0);
-  return nullptr;
 }
 
 const Fault* Executor::transmit(const KtMessage*& message, std::int32_t& cycles) const {

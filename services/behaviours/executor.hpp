@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <memory>
@@ -17,11 +18,12 @@ namespace kilotwin::behaviours {
 /// Octets below the stack pointer that are cleared before a robot runs. A program that reads there by mistake gets the same result
 /// whichever robot used the slot before.
 inline constexpr std::uint32_t kClearedOctets = 256;
-/// memset() to zero with a size that is hidden from the compiler. For a known size compilers emit `rep stos`, whose start-up is slower
-/// than the call.
-inline void clear(std::uint8_t* first, std::size_t octets) {
-  __asm__("" : "+r"(octets));
-  std::memset(first, 0, octets);
+/// Clears octets at an address. Written out: a call takes longer, and so does the `rep stos` of compilers.
+template <std::uint32_t kOctets> void clear(std::uint64_t address) {
+  using Words = std::uint64_t __attribute__((vector_size(16), aligned(1), may_alias));
+  auto* const words = reinterpret_cast<Words*>(address);  // NOLINT
+#pragma GCC unroll 16
+  for (std::uint32_t n = 0; n < kOctets / sizeof(Words); ++n) words[n] = Words{};
 }
 
 /// A robot's memory while it does not run, in one buffer: its data, the used part of its heap, its live stack.
@@ -35,15 +37,17 @@ class RobotMemory {
   void release() { *this = RobotMemory(); }
 
   void prefetch() const {
-    for (std::uint32_t at = 0; at < data_octets_ + stack_octets_; at += 64) __builtin_prefetch(octets_.get() + at);
+    const std::uint8_t* const first = octets_.get();
+    for (const std::uint8_t* line = first + data_octets_ + stack_octets_; line > first; line -= 64)
+      __builtin_prefetch(line - 1);
   }
   void copy_in(const Slot& slot, RobotThread& thread) const {
     std::memcpy(slot.data(), octets_.get(), data_octets_);
-    clear(slot.data() + data_octets_, kSlackOctets);
-    auto* const stack = reinterpret_cast<std::uint8_t*>(slot.stack_top() - stack_octets_);  // NOLINT
-    std::memcpy(stack, octets_.get() + data_octets_, stack_octets_);
-    if (stack_octets_ + kClearedOctets <= kStackOctets) clear(stack - kClearedOctets, kClearedOctets);
+    clear<kSlackOctets>(reinterpret_cast<std::uint64_t>(slot.data()) + data_octets_);  // NOLINT
     thread.robot_stack = slot.stack_top() - stack_octets_;
+    auto* const stack = reinterpret_cast<std::uint8_t*>(thread.robot_stack);  // NOLINT
+    std::memcpy(stack, octets_.get() + data_octets_, stack_octets_);
+    if (stack_octets_ + kClearedOctets <= kStackOctets) clear<kClearedOctets>(thread.robot_stack - kClearedOctets);
   }
   /// `data_octets`: Executor::data_octets(). False if the robot's stack pointer lies outside its stack.
   [[nodiscard]] bool copy_out(const Slot& slot, std::uint32_t data_octets, const RobotThread& thread) {
@@ -58,9 +62,16 @@ class RobotMemory {
     return true;
   }
 
-  /// Whether the robot in the slot has this memory, besides its clocks and what the host counts.
-  [[nodiscard]] bool equals(const Program& program, const Slot& slot, std::uint32_t data_octets,
-                            const RobotThread& thread) const;
+  /// Whether the robot in the slot has this memory, besides its clocks and what the host counts. These are copied out.
+  [[nodiscard]] bool settles(const Program& program, const Slot& slot, std::uint32_t data_octets,
+                             const RobotThread& thread) {
+    if (data_octets != data_octets_ || slot.stack_top() - thread.robot_stack != stack_octets_) return false;
+    const std::size_t clocks = program.file.table.robot - program.file.data.first + kClocks;
+    std::memcpy(octets_.get() + clocks, slot.data() + clocks, sizeof(KtRobot) - kClocks);
+    const auto* const stack = reinterpret_cast<const std::uint8_t*>(thread.robot_stack);  // NOLINT
+    return std::memcmp(slot.data(), octets_.get(), data_octets_) == 0 &&
+           std::memcmp(stack, octets_.get() + data_octets_, stack_octets_) == 0;
+  }
 
   [[nodiscard]] std::span<std::uint8_t> data() { return {octets_.get(), data_octets_}; }
   [[nodiscard]] std::span<const std::uint8_t> data() const { return {octets_.get(), data_octets_}; }
@@ -79,6 +90,9 @@ class RobotMemory {
   }
 
  private:
+  /// From here to its end KtRobot holds clocks.
+  static constexpr std::size_t kClocks = offsetof(KtRobot, debt_cycles);
+
   void resize(std::uint32_t data_octets, std::uint32_t stack_octets);
 
   std::unique_ptr<std::uint8_t[]> octets_;
@@ -155,7 +169,20 @@ class Executor {
 
   /// Calls kilo_message_tx_success if `sent`, and kilo_message_rx per reception. Adds their cycles to `cycles`.
   [[nodiscard]] const Fault* interrupt(std::span<const KtReception> receptions, bool sent,
-                                       std::int32_t& cycles) const;
+                                       std::int32_t& cycles) const {
+    KtExchange& exchange = *slot_.exchange();
+    exchange.sent = sent ? 1 : 0;
+    do {
+      const auto part = receptions.first(std::min<std::size_t>(receptions.size(), KT_MOST_RECEPTIONS));
+      exchange.receptions = static_cast<std::uint32_t>(part.size());
+      std::copy(part.begin(), part.end(), exchange.reception);
+      std::uint64_t result = 0;
+      if (const Fault* const fault = call(interrupts_, result, cycles)) return fault;
+      receptions = receptions.subspan(part.size());
+      exchange.sent = 0;
+    } while (!receptions.empty() && robot_->reset == 0);
+    return nullptr;
+  }
   /// Calls kilo_message_tx. `message` becomes the robot's message, or null if it has none. Adds the cycles to `cycles`.
   [[nodiscard]] const Fault* transmit(const KtMessage*& message, std::int32_t& cycles) const;
 
@@ -174,6 +201,9 @@ class Executor {
     thread_.leave = 0;
     std::atomic_signal_fence(std::memory_order_seq_cst);
   }
+  /// Limit of a callback: one second of the robot's time. On a robot a longer callback would block all messages, the clock and the
+  /// main program.
+  static constexpr std::int32_t kCallbackCycles = 8'000'000;
   /// A program that runs for this many cycles is checked for a busy wait.
   static constexpr std::int32_t kUnsuspected = 32768;
 
@@ -191,7 +221,17 @@ class Executor {
     return main.preempted;
   }
   void run_busy_wait(Main& main, std::int32_t previous_period) const;
-  [[nodiscard]] const Fault* call(std::uint64_t function, std::uint64_t& result, std::int32_t& cycles) const;
+  [[nodiscard]] const Fault* call(std::uint64_t function, std::uint64_t& result, std::int32_t& cycles) const {
+    thread_.budget = kCallbackCycles;
+    thread_.overrun = 0;
+    clear<kClearedOctets>(slot_.interrupt_stack_top() - kClearedOctets);
+    begin();
+    result = call_(function);
+    end();
+    cycles += kCallbackCycles - thread_.budget;
+    if (thread_.overrun != 0) return fail({Fault::kCallbackOverrun, robot_->in_interrupt, thread_.place});
+    return fault();
+  }
   [[nodiscard]] const Fault* fault() const {
     return thread_.fault.signal == Fault::kNone ? nullptr : &thread_.fault;
   }

@@ -57,7 +57,7 @@ Slot::Slot(const ElfFile& file, std::uint64_t address)
       exchange_(surroundings_ + kPage),
       image_(exchange_ + kExchangeOctets),
       data_offset_(file.data.first),
-      watched_words_(std::min(file.pad.last - file.pad.first, kWatchedOctets) / 8) {
+      watched_words_(std::min(file.pad.last - file.pad.first, kWatchedOctets) / 16 * 2) {
   void* mapped = mmap(pointer(address), size_, PROT_NONE,
                       MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_FIXED_NOREPLACE, -1, 0);
   if (mapped != pointer(address)) {

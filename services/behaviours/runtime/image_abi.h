@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 #define KT_IMAGE_MAGIC 0x6e6977746f6c696bu /* "kilotwin" */
-#define KT_IMAGE_VERSION 8u
+#define KT_IMAGE_VERSION 9u
 /* Size of the buffer for text that a robot prints in one tick. A serial line of 38400 baud sends 126 octets per tick. */
 #define KT_LOG_OCTETS 3584
 /* Section of the heap. It is the last of a robot's memory, so that only its used part need be saved. */
@@ -38,21 +38,27 @@ struct KtThread {
 #define KT_WAITED 0u
 #define KT_PREEMPTED 1u
 
-/* Simulated hardware of one robot and the state of its firmware; part of the robot's memory. "host": the host writes it. */
+/* Simulated hardware of one robot and the state of its firmware; part of the robot's memory. "host": the host writes it.
+ * From debt_cycles on stand clocks and counters: they differ from call to call of loop() although nothing has changed. */
 struct KtRobot {
   uint64_t noise;       /* host: state of the random number generator of sensors and rand_hard */
-  uint64_t debt_cycles; /* cycles spent in delays for which the program has not waited yet */
-  uint32_t tick_cycles; /* host: length of a tick */
-  uint16_t stuck_ticks; /* host: ticks spent in a loop without exit */
-  uint8_t loop_rate;    /* host: KT_LOOP_* */
-  uint8_t effects;      /* count of effects outside the memory: EEPROM writes, calls that found the ADC busy */
+  uint32_t heap_octets; /* largest extent of the heap so far */
   uint16_t uid;         /* host: uid and duties of the calibration, the initial content of the EEPROM */
-  uint8_t turn_left;    /* host */
-  uint8_t turn_right;   /* host */
-  uint8_t state;        /* kilotwin::LifeCycle */
+  uint16_t
+      blocked_at; /* low bits of kilo_ticks: the messages that are heard then lie in the tick to which blocked refers */
+  uint16_t
+      blocked;     /* end of the last long time with interrupts off: units of KT_BLOCKED_UNIT cycles of that tick */
+  int16_t adc;     /* the last conversion; after get_voltage() it replaces the next message's high-gain strength */
+  uint8_t effects; /* count of effects outside the memory: EEPROM writes, calls that found the ADC busy */
+  uint8_t turn_left;      /* host */
+  uint8_t turn_right;     /* host */
+  uint8_t straight_left;  /* host */
+  uint8_t straight_right; /* host */
+  uint8_t state;          /* kilotwin::LifeCycle */
   uint8_t motors_on;
   uint8_t duty_left;
   uint8_t duty_right;
+  uint8_t full; /* both motors have full duty since full_from */
   uint8_t led;
   uint8_t in_interrupt; /* KT_IN_* */
   uint8_t parked;       /* the main program does nothing until a message of the overhead controller arrives */
@@ -61,27 +67,22 @@ struct KtRobot {
   uint8_t reset;  /* the host must reset the memory */
   uint8_t motion; /* the motion that the last calibration message commanded */
   uint8_t motion_done;
-  uint64_t waits;         /* number of times that the program has waited for a tick */
-  uint8_t full;           /* both motors have full duty since full_from */
-  uint8_t straight_left;  /* host */
-  uint8_t straight_right; /* host */
-  uint8_t heard;          /* a message arrived while a sleeping robot listened */
-  int16_t adc; /* the last conversion; after get_voltage() it replaces the next message's high-gain strength */
+  uint8_t heard;        /* a message arrived while a sleeping robot listened */
   uint8_t trigger_lost; /* get_voltage() was called since the last message */
-  uint8_t looped;       /* host: the tick ended in a loop that reads no memory that an interrupt may change */
-  uint32_t heap_octets; /* largest extent of the heap so far */
-  uint16_t
-      blocked_at; /* low bits of kilo_ticks: the messages that are heard then lie in the tick to which blocked refers */
-  uint16_t
-      blocked; /* end of the last long time with interrupts off: units of KT_BLOCKED_UNIT cycles of that tick */
+  uint64_t debt_cycles; /* cycles spent in delays for which the program has not waited yet */
+  uint64_t waits;       /* number of times that the program has waited for a tick */
+  uint32_t tick_cycles; /* host: length of a tick */
+  uint32_t calls;       /* host: after this many further calls of loop() the host looks at the state */
   /* Time at full duty of both motors. The host takes and resets it at the end of each tick. */
   uint32_t full_from;   /* cycle of the tick */
   uint32_t full_cycles; /* in this tick, before full_from */
   uint8_t before_left;  /* duties before full_from */
   uint8_t before_right;
-  uint8_t spent;    /* host: 0; 1: the program has spent time in a delay or in a call */
-  uint8_t returned; /* host: 0; 1: loop() has returned as often as the host wants to know */
-  uint32_t calls;   /* host: after this many further calls of loop() the host looks at the state */
+  uint16_t stuck_ticks; /* host: ticks spent in a loop without exit */
+  uint8_t loop_rate;    /* host: KT_LOOP_* */
+  uint8_t looped;       /* host: the tick ended in a loop that reads no memory that an interrupt may change */
+  uint8_t spent;        /* host: 0; 1: the program has spent time in a delay or in a call */
+  uint8_t returned;     /* host: 0; 1: loop() has returned as often as the host wants to know */
 };
 
 #define KT_BLOCKED_UNIT 256u
@@ -173,7 +174,7 @@ struct KtImage {
 #else
 #define KT_ASSERT _Static_assert
 #endif
-KT_ASSERT(sizeof(struct KtRobot) == 80, "no padding");
+KT_ASSERT(sizeof(struct KtRobot) == 80 && __builtin_offsetof(struct KtRobot, debt_cycles) == 40, "no padding");
 KT_ASSERT(sizeof(struct KtMessage) == 12, "no padding");
 KT_ASSERT(sizeof(struct KtReception) == 16, "no padding");
 KT_ASSERT(sizeof(struct KtThread) == 48 && __builtin_offsetof(struct KtThread, budget) == KT_THREAD_BUDGET &&
