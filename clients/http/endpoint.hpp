@@ -1,6 +1,8 @@
 /// Endpoint: where a server listens, and how.
 #pragma once
 
+#include <strings.h>
+
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -17,7 +19,7 @@ struct Endpoint {
   [[nodiscard]] bool encrypted() const { return !certificate.empty(); }
   /// Whether the host is a loopback address, or localhost.
   [[nodiscard]] bool is_loopback() const {
-    return host == "localhost" ||
+    return strcasecmp(host.c_str(), "localhost") == 0 ||
            (host.starts_with("127.") && host.find_first_not_of("0123456789.") == std::string::npos);
   }
   /// Throws UserError if other machines could connect without TLS; if a file cannot be read; or if the host cannot stand in an

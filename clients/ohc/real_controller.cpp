@@ -13,6 +13,7 @@
 #include "clients/ohc/packet_queue.hpp"
 #include "clients/ohc/run_watch.hpp"
 #include "clients/ohc/serial_port.hpp"
+#include "clients/ohc/stop_rule.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/federation/topics.hpp"
@@ -93,14 +94,13 @@ class RealController {
         station_(participant_) {}
 
   void work() {
-    constexpr auto kLook = std::chrono::milliseconds(100);
     while (interrupted() == 0) {
       watch_run();
-      for (const auto until = Clock::now() + kLook; Clock::now() < until && interrupted() == 0;) {
+      for (const auto until = Clock::now() + StopRule::kLook; Clock::now() < until && interrupted() == 0;) {
         const auto packet = station_.take(until);
         if (!packet) continue;
         forward(*packet);
-        lived_ = true;  // STOP must follow, also if the run ends before the next look
+        stop_rule_.forwarded();
       }
       if (!guard_.runs()) take_over();
     }
@@ -112,22 +112,18 @@ class RealController {
   }
 
  private:
-  /// STOP where the run is over, or its station has fallen silent: nothing of it goes on.
   void watch_run() {
-    const bool has_run = announcer_.look();
-    const bool is_silent = has_run && watch_.is_silent();
-    const bool lives = has_run && !is_silent;
-    if (lived_ && !lives) {
+    announcer_.look();
+    const StopRule::Verdict verdict = stop_rule_.look(watch_.heard(), Clock::now());
+    if (verdict.stop) {
       station_.clear();
       forward({});
     }
-    if (is_silent && !was_silent_) {
-      say(fmt::format("kilotwin: no status of the run for {} s: the robots get STOP until its station is back",
-                      RunWatch::kLongestSilence.count()));
+    if (verdict.news == StopRule::News::kSilent) {
+      say(fmt::format("kilotwin: no status of the run for {:g} s: the robots get STOP until its station is back",
+                      std::chrono::duration<double>(StopRule::kLongestSilence).count()));
     }
-    if (was_silent_ && lives) say("kilotwin: the station is back");
-    lived_ = lives;
-    was_silent_ = is_silent;
+    if (verdict.news == StopRule::News::kBack) say("kilotwin: the station is back");
   }
 
   /// Returns when the line is free for the next packet.
@@ -152,7 +148,7 @@ class RealController {
   StationPackets station_;
   PacketLog log_;
   const Clock::time_point begun_ = Clock::now();
-  bool lived_ = false, was_silent_ = false;
+  StopRule stop_rule_;
 };
 
 }  // namespace

@@ -17,16 +17,20 @@ RunWatch::RunWatch(const dds::Participant& participant)
         }
       }) {}
 
+bool RunWatch::has_run() const {
+  return status_ && status_->phase != kilotwin_open_ENDED && status_->phase != kilotwin_open_BROKEN;
+}
+
 std::optional<std::string> RunWatch::run() const {
   const std::lock_guard lock(mutex_);
-  if (!status_ || status_->phase == kilotwin_open_ENDED || status_->phase == kilotwin_open_BROKEN)
-    return std::nullopt;
+  if (!has_run()) return std::nullopt;
   return status_->name;
 }
 
-bool RunWatch::is_silent() const {
+std::optional<std::chrono::steady_clock::time_point> RunWatch::heard() const {
   const std::lock_guard lock(mutex_);
-  return status_ && Clock::now() - heard_ > kLongestSilence;
+  if (!has_run()) return std::nullopt;
+  return heard_;
 }
 
 bool RunAnnouncer::look() {

@@ -16,12 +16,13 @@ class RunWatch {
 
   /// Name of the run that has started and not ended; nothing where there is none.
   [[nodiscard]] std::optional<std::string> run() const;
-  /// Whether the station of that run has written no status for kLongestSilence. It promises some 5 a second.
-  [[nodiscard]] bool is_silent() const;
-  static constexpr std::chrono::seconds kLongestSilence{1};
+  /// When the last status of that run came.
+  [[nodiscard]] std::optional<std::chrono::steady_clock::time_point> heard() const;
 
  private:
   using Clock = std::chrono::steady_clock;
+
+  [[nodiscard]] bool has_run() const;
 
   mutable std::mutex mutex_;
   std::optional<PublicRunStatus> status_;

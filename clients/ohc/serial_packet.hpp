@@ -18,7 +18,8 @@ inline constexpr std::uint8_t kHeader = 0x55;
 inline constexpr int kOctetsPerSecond = 3840;
 /// How long a controller that is switched on blinks before it listens, s.
 inline constexpr double kStartUp_s = 2.0;
-/// How long a controller that sends a page has its interrupts off and loses octets, s.
+/// How long a controller that sends a page has its interrupts off and loses octets, s: 22 messages of 4.371 ms, rounded up. The LED
+/// flash after them hears octets. With the 34.4 ms of a packet on the line this gives 131 ms per page, the pace of KiloGUI.
 inline constexpr double kPage_s = 0.097;
 
 using SerialPacket = std::array<std::uint8_t, kSerialPacket>;

@@ -11,6 +11,7 @@
 #include <optional>
 #include <thread>
 
+#include "clients/ohc/call_limit.hpp"
 #include "core/base/say.hpp"
 #include "core/os/files.hpp"
 #include "core/os/interrupt.hpp"
@@ -21,12 +22,12 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-/// Surely longer than a page takes, for a port that buffers.
+/// Between the two STOPs at the end. kPage_s is the pace of pages, whose loss a program's next pass mends; nothing mends the loss of
+/// the last STOP, and a port may hold octets back that it has reported as sent. So this one has half a page to spare.
 constexpr milliseconds kPageTime{150};
 constexpr milliseconds kRetry{500};
 /// A controller that opening the port has reset listens after this.
 constexpr milliseconds kStartUp{2200};
-constexpr int kPatience_ms = 2000;
 
 /// The loop of serve_port().
 class PortServer {
@@ -52,7 +53,7 @@ class PortServer {
       const char done = 1;
       static_cast<void>(::send(socket_, &done, sizeof done, MSG_NOSIGNAL));
     }
-    if (port_.is_open() && port_.is_gone()) lose();
+    if (port_.is_open() && port_.is_gone()) lose("it is gone");
     if (!port_.is_open() && Clock::now() >= next_try_) regain();
     if (repeat_at_ && Clock::now() >= *repeat_at_) repeat();
     return true;
@@ -61,23 +62,26 @@ class PortServer {
   void forward(const OverheadPacket& packet) {
     last_ = packet;
     if (!port_.is_open()) return;
-    if (!port_.send(packet)) return lose();
+    if (!port_.send(packet)) return lose(port_.failure());
     if (packet.command == OverheadCommand::kBootPage)
       std::this_thread::sleep_for(std::chrono::duration<double>(kPage_s));
   }
 
-  void lose() {
+  void lose(const std::string& why) {
     port_.close();
     repeat_at_.reset();
     next_try_ = Clock::now() + kRetry;
-    say(fmt::format("kilotwin: {}: the port is gone; waiting for it", port_.device().string()));
+    if (why == lost_by_) return;
+    lost_by_ = why;
+    say(fmt::format("kilotwin: {}: the port is lost: {}; waiting for it", port_.device().string(), why));
   }
 
   void regain() {
     next_try_ = Clock::now() + kRetry;
     if (!port_.open().empty()) return;
+    if (last_ && !port_.send(*last_)) return lose(port_.failure());
+    lost_by_.clear();
     say(fmt::format("kilotwin: {}: the port is back", port_.device().string()));
-    if (last_ && !port_.send(*last_)) return lose();
     repeat_at_ = Clock::now() + kStartUp;
   }
 
@@ -86,7 +90,7 @@ class PortServer {
     repeat_at_.reset();
     const bool lasts =
         last_ && (last_->command == OverheadCommand::kRepeat || last_->command == OverheadCommand::kRaw);
-    if (lasts && port_.is_open() && !port_.send(*last_)) lose();
+    if (lasts && port_.is_open() && !port_.send(*last_)) lose(port_.failure());
   }
 
   /// Twice, as a controller is deaf while it sends a page.
@@ -99,13 +103,16 @@ class PortServer {
     bool sent = port_.send({});
     std::this_thread::sleep_for(kPageTime);
     sent = port_.send({}) || sent;
-    if (!sent)
-      say(fmt::format("kilotwin: {}: STOP could not be sent: switch the controller off", port_.device().string()));
+    if (!sent) {
+      say(fmt::format("kilotwin: {}: STOP could not be sent: {}; switch the controller off",
+                      port_.device().string(), port_.failure()));
+    }
   }
 
   SerialPort& port_;
   const int socket_;
   std::optional<OverheadPacket> last_;
+  std::string lost_by_;  ///< why the port is lost; empty: it is not
   std::optional<Clock::time_point> repeat_at_ = Clock::now() + kStartUp;
   Clock::time_point next_try_{};
 };
@@ -128,6 +135,32 @@ std::string SerialPort::open() {
   return {};
 }
 
+void SerialPort::close() {
+  if (is_open()) tcflush(port_.get(), TCOFLUSH);
+  port_.reset();
+}
+
+bool SerialPort::fail(std::string reason) {
+  failure_ = std::move(reason);
+  return false;
+}
+
+std::string SerialPort::stalled() const {
+  return fmt::format("it has taken no octets for {:g} s; unplug the adapter and plug it in again",
+                     std::chrono::duration<double>(patience_).count());
+}
+
+/// Until the last octet is through. The system itself would wait for an adapter that is stuck for ever.
+bool SerialPort::drain() {
+  const Clock::time_point until = Clock::now() + patience_;
+  const CallLimit limit(patience_);
+  while (tcdrain(port_.get()) != 0) {
+    if (errno != EINTR) return fail("it is gone");
+    if (Clock::now() >= until) return fail(stalled());
+  }
+  return true;
+}
+
 bool SerialPort::send(const OverheadPacket& packet) {
   const SerialPacket octets = encode(packet);
   for (std::size_t sent = 0; sent < octets.size();) {
@@ -136,11 +169,15 @@ bool SerialPort::send(const OverheadPacket& packet) {
       sent += static_cast<std::size_t>(count);
       continue;
     }
-    if (count < 0 && errno != EAGAIN && errno != EINTR) return false;
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0 && errno != EAGAIN) return fail("it is gone");
     pollfd event{port_.get(), POLLOUT, 0};
-    if (poll(&event, 1, kPatience_ms) <= 0 || (event.revents & (POLLHUP | POLLERR)) != 0) return false;
+    const int ready = poll(&event, 1, static_cast<int>(patience_.count()));
+    if (ready < 0 && errno == EINTR) continue;
+    if (ready <= 0) return fail(stalled());
+    if ((event.revents & (POLLHUP | POLLERR)) != 0) return fail("it is gone");
   }
-  return tcdrain(port_.get()) == 0;
+  return drain();
 }
 
 bool SerialPort::is_gone() const {

@@ -1,5 +1,7 @@
 #include "clients/track/detect.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -182,6 +184,23 @@ Detection detection_of(const FittedCircle& circle) {
 }
 
 }  // namespace
+
+std::string scale_advice(std::optional<double> radius_px) {
+  if (!radius_px) {
+    return fmt::format(
+        "no robots are found; their discs must be darker than the floor, with a radius of {:g} to {:g} pixels, "
+        "better "
+        "{:g} or more",
+        kLeastRadius_px, kMostRadius_px, kWellSeenRadius_px);
+  }
+  if (*radius_px >= kWellSeenRadius_px) return {};
+  const double more = kWellSeenRadius_px / *radius_px;
+  return fmt::format(
+      "the robots' discs have a radius of {:.1f} pixels; below {:g}, robots that touch or lie in clutter are "
+      "missed{}. "
+      "Use {:.1f} times the resolution, or mount the camera at {:.2f} of its height, or see a part of the arena",
+      *radius_px, kWellSeenRadius_px, *radius_px < kLeastRadius_px ? ", and many others too" : "", more, 1 / more);
+}
 
 Detector::Detector(std::optional<double> radius_px) : known_radius_px_(radius_px) {}
 

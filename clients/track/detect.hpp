@@ -6,6 +6,7 @@
 
 #include <opencv2/core.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "clients/track/covariance.hpp"
@@ -15,6 +16,12 @@ namespace kilotwin::track {
 
 /// Radii that are searched, px. Smaller discs have too few pixels for a circle to be told from clutter.
 inline constexpr double kLeastRadius_px = 5, kMostRadius_px = 90;
+/// Below, robots that touch or lie in clutter are missed: docs/results/camera-tracker.md, "Drawn discs".
+inline constexpr double kWellSeenRadius_px = 8;
+
+/// What is wrong with the size of the robots in the picture, and what would do; empty where all is well. `radius_px`: of their
+/// discs, as found or as the calibration states it; nothing where neither is known.
+[[nodiscard]] std::string scale_advice(std::optional<double> radius_px);
 
 /// A robot in one picture.
 struct Detection {

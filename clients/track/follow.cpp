@@ -17,7 +17,7 @@ constexpr double kMargin = 9;
 constexpr int kConfirm = 3, kGiveUp = 3;
 /// Share of the radius by which a fitted centre may be off for reasons that its deviation does not know.
 constexpr double kShift = 0.07;
-/// A robot that may be held with this probability does not show how robots carry their LED.
+/// A robot that may be held with this probability does not show how robots carry their LED, and what they look like.
 constexpr double kMostHeld = 0.1;
 /// No robot is faster.
 constexpr double kTopSpeed_mm_s = 35;
@@ -53,20 +53,32 @@ void Follower::take(Track& track, std::size_t index, const Sighting& sighting) {
   ++track.led_count;
   track.led = most_frequent(track.leds, std::min(track.led_count, 5));
   track.path.add(time_s_, sighting.x_mm, sighting.y_mm);
-  std::optional<double> by_led;
-  double by_led_sd = 0;
-  if (sighting.led_bearing_rad) {
-    const bool held = track.heading_filter.modes()[HeadingFilter::kHeld] > kMostHeld;
-    if (const std::optional<double> heading = track.path.heading_rad(); heading && !held)
-      led_bearing_.add(*sighting.led_bearing_rad, *heading);
-    if (const std::optional<LedMount> mount = led_bearing_.mount()) {
-      by_led = wrapped(*sighting.led_bearing_rad - mount->from_heading_rad);
-      // Errors of successive frames go together: each counts for less.
-      by_led_sd = 3 * mount->sd_rad;
-    }
-  }
   const double sd_mm = std::sqrt(0.5 * (sighting.error.xx + sighting.error.yy));
-  track.heading_filter.update(time_s_, sighting.x_mm, sighting.y_mm, sd_mm, by_led, by_led_sd);
+  if (const auto shown = shown_heading(track, sighting))
+    track.heading_filter.update(time_s_, sighting.x_mm, sighting.y_mm, sd_mm, shown->heading_rad, shown->sd_rad);
+  else
+    track.heading_filter.update(time_s_, sighting.x_mm, sighting.y_mm, sd_mm);
+}
+
+std::optional<Follower::ShownHeading> Follower::shown_heading(const Track& track, const Sighting& sighting) {
+  const bool held = track.heading_filter.modes()[HeadingFilter::kHeld] > kMostHeld;
+  const std::optional<double> driven_rad = held ? std::nullopt : track.path.heading_rad();
+  if (sighting.led_bearing_rad) return heading_of(led_bearing_, *sighting.led_bearing_rad, driven_rad);
+  if (!sighting.body) return std::nullopt;
+  // Judged first, then learned from: so the agreement is that of pictures which the pattern does not know.
+  const std::optional<double> turned_rad = pattern_.heading_rad(*sighting.body);
+  if (driven_rad) pattern_.learn(*sighting.body, *driven_rad);
+  if (!turned_rad) return std::nullopt;
+  return heading_of(pattern_bearing_, *turned_rad, driven_rad);
+}
+
+std::optional<Follower::ShownHeading> Follower::heading_of(LedBearing& mounted, double bearing_rad,
+                                                           const std::optional<double>& driven_rad) {
+  if (driven_rad) mounted.add(bearing_rad, *driven_rad);
+  const std::optional<LedMount> mount = mounted.mount();
+  if (!mount) return std::nullopt;
+  // Errors of successive frames go together: each counts for less.
+  return ShownHeading{wrapped(bearing_rad - mount->from_heading_rad), 3 * mount->sd_rad};
 }
 
 void Follower::miss(Track& track) const {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "clients/track/body_pattern.hpp"
 #include "clients/track/heading_filter.hpp"
 #include "clients/track/led.hpp"
 #include "clients/track/led_bearing.hpp"
@@ -20,6 +21,7 @@ struct Sighting {
   Covariance error = Covariance::round(0.2);  ///< of the position, mm^2
   Led led = Led::kOff;
   std::optional<double> led_bearing_rad;  ///< from the centre, anticlockwise from x
+  std::optional<BodyPicture> body{};      ///< where the LED is dark
 };
 
 /// As in TrackerFrame of idl/public.idl.
@@ -72,7 +74,14 @@ class Follower {
   void clear_doubt(std::uint32_t id);
 
  private:
+  /// A heading that the robot shows by itself, at rest too.
+  struct ShownHeading {
+    double heading_rad, sd_rad;
+  };
   void take(Track& track, std::size_t index, const Sighting& sighting);
+  [[nodiscard]] std::optional<ShownHeading> shown_heading(const Track& track, const Sighting& sighting);
+  static std::optional<ShownHeading> heading_of(LedBearing& mounted, double bearing_rad,
+                                                const std::optional<double>& driven_rad);
   void miss(Track& track) const;
   void begin(std::size_t index, const Sighting& sighting);
 
@@ -82,6 +91,8 @@ class Follower {
   std::uint32_t next_id_ = 0;
   std::vector<Track> tracks_;
   LedBearing led_bearing_;
+  BodyPattern pattern_;
+  LedBearing pattern_bearing_;  ///< how well the pattern's headings agree with those of paths
   std::uint64_t doubts_ = 0;
 };
 

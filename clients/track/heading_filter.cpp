@@ -22,8 +22,10 @@ constexpr std::array<Mode, HeadingFilter::kModes> kModesOfMotion{{
     {10, 0.8, 2.5, 0.15},
     {10, -0.8, 2.5, 0.15},
     {0, 0, 6, 6},
+    {0, 0, 0.05, 0.6},
 }};
-/// Rate at which a robot changes its mode, 1/s, and the share of these changes by which something begins to hold it.
+/// Rate at which a robot changes its mode, 1/s, and the share of these changes by which something begins to hold it. As many make
+/// it turn in place where its heading is seen.
 constexpr double kSwitching_1_s = 0.5, kHeldShare = 0.05;
 /// The rate at which a robot that is held comes free, of kSwitching_1_s.
 constexpr double kHeldLasts = 0.5;
@@ -32,6 +34,8 @@ constexpr double kHeldLasts = 0.5;
 constexpr double kKnownAfter_s = 5;
 /// Densities of the noise of a robot that is held: heading rad^2/s, velocity (mm/s)^2/s. It may turn unseen.
 constexpr double kHeldHeadingNoise = 0.05, kHeldVelocityNoise = 5;
+/// Density of the noise of the turn rate of a robot that turns in place, (rad/s)^2/s.
+constexpr double kTurnedNoise = 0.3;
 /// Densities of the noise while a mode lasts, per second: of the axle along its heading mm^2, heading rad^2, position otherwise mm^2,
 /// speed (mm/s)^2, turn rate (rad/s)^2. The first two are those of wheels that let the heading wander by 1.4 degrees in a second.
 constexpr double kAlongNoise = 0.1, kHeadingNoise = 6e-4, kOtherNoise = 0.01, kSpeedNoise = 0.3, kTurnNoise = 1e-3;
@@ -62,31 +66,37 @@ void HeadingFilter::start(double time_s, double x_mm, double y_mm, double sd_mm,
     const Mode& mode = kModesOfMotion[i];
     const double offset = mode.speed_mm_s > 0 ? std::atan2(kAhead_mm * mode.turn_rad_s, mode.speed_mm_s) : 0;
     const double heading = bearing_rad ? *bearing_rad : wrapped(direction - offset);
-    const double heading_sd = bearing_rad ? bearing_sd_rad : (i == 0 ? 0.7 : i == kHeld ? 1.0 : 0.35);
+    const double heading_sd = bearing_rad ? bearing_sd_rad : (i == 0 ? 0.7 : i >= kHeld ? 1.0 : 0.35);
     hypotheses_[i].state << x_mm, y_mm, heading, mode.speed_mm_s, mode.turn_rad_s;
     hypotheses_[i].covariance = Matrix::Zero();
     hypotheses_[i].covariance.diagonal() << sd_mm * sd_mm, sd_mm * sd_mm, heading_sd * heading_sd,
         mode.speed_sd * mode.speed_sd, mode.turn_sd * mode.turn_sd;
   }
-  weights_ = moves ? std::array<double, kModes>{0.01, 0.53, 0.23, 0.23, 1e-4}
-                   : std::array<double, kModes>{0.7, 0.1, 0.1, 0.1, 1e-4};
+  weights_ = moves ? std::array<double, kModes>{0.01, 0.53, 0.23, 0.23, 1e-4, 1e-4}
+                   : std::array<double, kModes>{0.7, 0.1, 0.1, 0.1, 1e-4, 1e-4};
 }
 
-void HeadingFilter::mix(double dt_s) {
+void HeadingFilter::mix(double dt_s, bool heading_is_seen) {
   const double leaves = 1 - std::exp(-kSwitching_1_s * dt_s);
   const double held = time_s_ - started_s_ < kKnownAfter_s ? kLeastWeight : kHeldShare;
-  const auto share_of = [leaves, held](std::size_t from, std::size_t to) {
-    if (from == kHeld) return from == to ? 1 - kHeldLasts * leaves : kHeldLasts * leaves / (kModes - 1);
+  const double turned = heading_is_seen ? held : 0;
+  const auto share_of = [=](std::size_t from, std::size_t to) {
+    // Nobody sees any more how it turns.
+    if (from == kTurned && !heading_is_seen) return to == kStop || to == kHeld ? 0.5 : 0.0;
+    if (!heading_is_seen && to == kTurned) return 0.0;
+    if (from >= kHeld) return from == to ? 1 - kHeldLasts * leaves : kHeldLasts * leaves / (kModes - 1);
     if (from == to) return 1 - leaves;
-    return to == kHeld ? held * leaves : (1 - held) * leaves / (kModes - 2);
+    if (to == kHeld) return held * leaves;
+    return to == kTurned ? turned * leaves : (1 - held - turned) * leaves / (kModes - 3);
   };
-  std::array<Hypothesis, kModes> mixed;
+  std::array<Hypothesis, kModes> mixed = hypotheses_;
   std::array<double, kModes> weights{};
   for (std::size_t to = 0; to < kModes; ++to) {
     const Mode& mode = kModesOfMotion[to];
     std::array<double, kModes> shares{};
     for (std::size_t from = 0; from < kModes; ++from) shares[from] = share_of(from, to) * weights_[from];
     for (const double share : shares) weights[to] += share;
+    if (weights[to] == 0) continue;  // turned, where headings are not seen
     std::array<Hypothesis, kModes> entering = hypotheses_;
     for (std::size_t from = 0; from < kModes; ++from) {
       if (from == to) continue;
@@ -130,11 +140,25 @@ void HeadingFilter::predict_held(Hypothesis& h, double dt_s) {
   h.covariance(4, 4) += kHeldVelocityNoise * dt_s;
 }
 
+void HeadingFilter::predict_turned(Hypothesis& h, double dt_s) {
+  h.state(2) = wrapped(h.state(2) + h.state(4) * dt_s);
+  Matrix step = Matrix::Identity();
+  step(2, 4) = dt_s;
+  h.covariance = step * h.covariance * step.transpose();
+  h.covariance(0, 0) += kOtherNoise * dt_s;
+  h.covariance(1, 1) += kOtherNoise * dt_s;
+  h.covariance(4, 4) += kTurnedNoise * dt_s;
+}
+
 void HeadingFilter::predict(double dt_s) {
   for (std::size_t i = 0; i < kModes; ++i) {
     Hypothesis& h = hypotheses_[i];
     if (i == kHeld) {
       predict_held(h, dt_s);
+      continue;
+    }
+    if (i == kTurned) {
+      predict_turned(h, dt_s);
       continue;
     }
     const double v = h.state(3), w = h.state(4);
@@ -153,7 +177,7 @@ void HeadingFilter::predict(double dt_s) {
     jacobian(1, 4) = (kAhead_mm * c + 0.5 * dt_s * vx) * dt_s;
     jacobian(2, 4) = dt_s;
     h.covariance = jacobian * h.covariance * jacobian.transpose();
-    const bool moves = i != 0;
+    const bool moves = i != kStop;
     h.covariance(0, 0) += kOtherNoise * dt_s;
     h.covariance(1, 1) += kOtherNoise * dt_s;
     if (moves) {
@@ -187,7 +211,7 @@ void HeadingFilter::measure(double x_mm, double y_mm, double sd_mm) {
     h.covariance = 0.5 * (h.covariance + h.covariance.transpose()).eval();
     likelihoods[i] = -0.5 * innovation.dot(inverse * innovation) - 0.5 * std::log(total.determinant());
     // Robots do not drive backwards: a negative speed is the wrong heading.
-    if (i != 0 && i != kHeld && h.state(3) < 0) likelihoods[i] -= 0.5 * h.state(3) * h.state(3);
+    if (i != kStop && i < kHeld && h.state(3) < 0) likelihoods[i] -= 0.5 * h.state(3) * h.state(3);
   }
   weigh(likelihoods);
 }
@@ -210,10 +234,12 @@ void HeadingFilter::measure_bearing(double bearing_rad, double sd_rad) {
 }
 
 void HeadingFilter::weigh(const std::array<double, kModes>& log_likelihoods) {
-  const double most = *std::max_element(log_likelihoods.begin(), log_likelihoods.end());
-  double sum = 0;
+  double most = -1e300, sum = 0;
   for (std::size_t i = 0; i < kModes; ++i) {
-    weights_[i] = std::max(kLeastWeight, weights_[i] * std::exp(log_likelihoods[i] - most));
+    if (weights_[i] > 0) most = std::max(most, log_likelihoods[i]);
+  }
+  for (std::size_t i = 0; i < kModes; ++i) {
+    if (weights_[i] > 0) weights_[i] = std::max(kLeastWeight, weights_[i] * std::exp(log_likelihoods[i] - most));
     sum += weights_[i];
   }
   for (double& weight : weights_) weight /= sum;
@@ -231,7 +257,7 @@ void HeadingFilter::update(double time_s, double x_mm, double y_mm, double sd_mm
   constexpr int kMostSteps = 50;
   for (int step = 0; left_s > 1e-9 && step < kMostSteps; ++step) {
     const double dt_s = step + 1 == kMostSteps ? left_s : std::min(kStep_s, left_s);
-    mix(dt_s);
+    mix(dt_s, bearing_rad.has_value());
     predict(dt_s);
     left_s -= dt_s;
   }

@@ -5,7 +5,8 @@
 /// extended Kalman filter holds (x, y, heading, speed, turn rate) with
 ///   x' = v cos h - a w sin h,  y' = v sin h + a w cos h,  h' = w.
 /// A robot that a wall or another robot holds slides: its path then tells nothing of its heading. A fifth mode, held, has
-/// (x, y, heading, x', y') instead, with a heading that wanders.
+/// (x, y, heading, x', y') instead, with a heading that wanders. In a sixth one, turned, the disc stays and the robot turns about its
+/// centre: only a measured heading shows that.
 /// The modes differ in what their speeds are at their beginning, and exchange weight as in Blom and Bar-Shalom (1988).
 /// docs/explanation/camera-tracker.md has the equations.
 #pragma once
@@ -29,8 +30,8 @@ class HeadingFilter {
               std::optional<double> bearing_rad = std::nullopt, double bearing_sd_rad = 0);
   /// Nothing until the robot has moved, or its heading was measured.
   [[nodiscard]] std::optional<Heading> heading() const;
-  /// Stop, straight, left, right, held.
-  static constexpr std::size_t kModes = 5, kHeld = 4;
+  /// Stop, straight, left, right, held, turned.
+  static constexpr std::size_t kModes = 6, kStop = 0, kHeld = 4, kTurned = 5;
   /// Probabilities of the modes; nothing before heading().
   [[nodiscard]] const std::array<double, kModes>& modes() const { return weights_; }
 
@@ -44,9 +45,10 @@ class HeadingFilter {
 
   void start(double time_s, double x_mm, double y_mm, double sd_mm, std::optional<double> bearing_rad,
              double bearing_sd_rad);
-  void mix(double dt_s);
+  void mix(double dt_s, bool heading_is_seen);
   void predict(double dt_s);
   static void predict_held(Hypothesis& h, double dt_s);
+  static void predict_turned(Hypothesis& h, double dt_s);
   void measure(double x_mm, double y_mm, double sd_mm);
   void measure_bearing(double bearing_rad, double sd_rad);
   void weigh(const std::array<double, kModes>& log_likelihoods);

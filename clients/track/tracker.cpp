@@ -28,6 +28,12 @@ std::vector<Circle> near(const std::vector<Circle>& discs, const Point& place, d
 PictureTracker::PictureTracker(std::optional<FloorMap> floor)
     : floor_(std::move(floor)), calibrated_(floor_.has_value()) {}
 
+std::optional<double> PictureTracker::radius_px(const cv::Size& picture) const {
+  if (detector_.look()) return detector_.look()->radius_px;
+  if (!calibrated_) return std::nullopt;
+  return kRobotRadius_mm / floor_->mm_per_px({0.5 * picture.width, 0.5 * picture.height});
+}
+
 std::vector<Circle> PictureTracker::predicted_discs() const {
   std::vector<Circle> discs;
   for (const Track& track : follower_.tracks())
@@ -48,8 +54,7 @@ cv::Rect PictureTracker::next_strip(const cv::Size& picture, double time_s) {
 std::vector<Detection> PictureTracker::look(const cv::Mat& grey, double time_s) {
   if (calibrated_ && !detector_.look()) {
     // The calibration tells the robots' size. One that is wrong shall not hide them.
-    const Point middle{0.5 * grey.cols, 0.5 * grey.rows};
-    Detector sized(kRobotRadius_mm / floor_->mm_per_px(middle));
+    Detector sized(radius_px(grey.size()));
     std::vector<Detection> found = sized.find(grey);
     if (!found.empty()) {
       detector_ = sized;
@@ -84,8 +89,8 @@ std::vector<Detection> PictureTracker::look(const cv::Mat& grey, double time_s) 
   return found;
 }
 
-Sighting PictureTracker::sighting_of(const cv::Mat& picture, const std::vector<Detection>& found,
-                                     std::size_t index) const {
+Sighting PictureTracker::sighting_of(const cv::Mat& picture, const cv::Mat& grey,
+                                     const std::vector<Detection>& found, std::size_t index) const {
   const Detection& detection = found[index];
   std::vector<Circle> others;
   for (std::size_t i = 0; i < found.size(); ++i) {
@@ -96,6 +101,7 @@ Sighting PictureTracker::sighting_of(const cv::Mat& picture, const std::vector<D
   Sighting sighting{at.x_mm, at.y_mm, floor_->covariance(detection.disc.centre, detection.error_px2), led.led,
                     std::nullopt};
   if (led.bearing_rad) sighting.led_bearing_rad = floor_->floor_direction(detection.disc.centre, *led.bearing_rad);
+  if (led.led == Led::kOff) sighting.body = BodyPicture::of(grey, detection.disc.centre, *floor_);
   return sighting;
 }
 
@@ -109,7 +115,7 @@ std::vector<TrackedRobot> PictureTracker::process(const cv::Mat& picture, double
   }
   follower_.predict(time_s);
   std::vector<Sighting> sightings;
-  for (std::size_t i = 0; i < found.size(); ++i) sightings.push_back(sighting_of(picture, found, i));
+  for (std::size_t i = 0; i < found.size(); ++i) sightings.push_back(sighting_of(picture, grey, found, i));
   follower_.update(sightings);
 
   std::vector<TrackedRobot> robots;

@@ -38,6 +38,8 @@ class PictureTracker {
 
   /// Nothing while there is neither a calibration nor a robot.
   [[nodiscard]] const std::optional<FloorMap>& floor() const { return floor_; }
+  /// Of the robots' discs, px: as found, or else as a calibration states it for the middle of the picture.
+  [[nodiscard]] std::optional<double> radius_px(const cv::Size& picture) const;
   [[nodiscard]] const Follower& follower() const { return follower_; }
   [[nodiscard]] Follower& follower() { return follower_; }
 
@@ -45,8 +47,8 @@ class PictureTracker {
   [[nodiscard]] std::vector<Detection> look(const cv::Mat& grey, double time_s);
   [[nodiscard]] std::vector<Circle> predicted_discs() const;
   [[nodiscard]] cv::Rect next_strip(const cv::Size& picture, double time_s);
-  [[nodiscard]] Sighting sighting_of(const cv::Mat& picture, const std::vector<Detection>& found,
-                                     std::size_t index) const;
+  [[nodiscard]] Sighting sighting_of(const cv::Mat& picture, const cv::Mat& grey,
+                                     const std::vector<Detection>& found, std::size_t index) const;
 
   std::optional<FloorMap> floor_;
   const bool calibrated_;

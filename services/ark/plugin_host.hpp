@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -23,6 +24,8 @@ class PluginHost {
 struct PluginPatience {
   double cpu_s = 2, wall_s = 60, step_wall_s = 60;
   static constexpr double kPacedStep_s = 2;  ///< step_wall_s of a run at a pace
+  /// Called some 20 times a second while the station waits for a plugin in a process of its own.
+  std::function<void()> while_waiting{};
 };
 
 /// Throws UserError where the run directory lacks the plugin's object, or there is no built-in plugin of the name.

@@ -123,6 +123,7 @@ class PluginProcess final : public PluginHost {
       }
       const double waited_s = std::chrono::duration<double>(Clock::now() - asked).count();
       if (limited ? is_too_long() : waited_s > kLastWord_s) return Wait::kTooLong;
+      if (patience_.while_waiting) patience_.while_waiting();
     }
     return Wait::kReady;
   }

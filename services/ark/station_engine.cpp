@@ -54,13 +54,6 @@ std::int64_t cycles_of(double seconds) {
   return whole + static_cast<std::int64_t>(static_cast<double>(whole) < cycles);
 }
 
-/// A paced run cannot stand still for a plugin: real robots drive on.
-PluginPatience patience_of(const RunPlan& plan) {
-  PluginPatience patience;
-  if (plan.pace > 0) patience.step_wall_s = PluginPatience::kPacedStep_s;
-  return patience;
-}
-
 /// Whether a multiple of `every_s` lies in (before, now].
 bool is_due(double before_s, double now_s, double every_s) {
   return every_s > 0 && (before_s < 0 || kt_floor(now_s / every_s) > kt_floor(before_s / every_s));
@@ -151,11 +144,21 @@ station::Request StationEngine::request(station::Call call, Tick at) const {
   return request;
 }
 
+/// A paced run cannot stand still for a plugin: real robots drive on.
+PluginPatience StationEngine::patience_with(const EnvironmentSettings& setting) {
+  PluginPatience patience;
+  if (plan_.pace > 0) patience.step_wall_s = PluginPatience::kPacedStep_s;
+  patience.while_waiting = [this, &setting] {
+    if (tell_) tell_(setting.name);
+  };
+  return patience;
+}
+
 void StationEngine::set_up(std::uint32_t environment, bool resumed) {
   const EnvironmentSettings& setting = setting_.environments[environment];
   Plugin& plugin = plugins_[environment];
   plugin = {};
-  plugin.host = make_plugin_host(setting, setting_.host_sha256, run_directory_, patience_of(plan_));
+  plugin.host = make_plugin_host(setting, setting_.host_sha256, run_directory_, patience_with(setting));
   station::Request request = this->request(station::Call::kSetup, now_);
   request.resumed = resumed;
   request.seed = plan_.seed();

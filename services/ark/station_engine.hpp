@@ -11,6 +11,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -79,6 +80,8 @@ class StationEngine {
   [[nodiscard]] const std::string& failure(std::uint32_t environment) const {
     return plugins_[environment].failure;
   }
+  /// Called again and again while the engine waits for a plugin, with the plugin's name. No part of the state.
+  void while_plugins_compute(std::function<void(const std::string& plugin)> tell) { tell_ = std::move(tell); }
   [[nodiscard]] const SeenRobots& seen() const { return setting_.camera ? camera_->shown() : seen_; }
 
  private:
@@ -93,6 +96,7 @@ class StationEngine {
 
   void see(const SwarmView&);
   void see_initial_poses();
+  [[nodiscard]] PluginPatience patience_with(const EnvironmentSettings& setting);
   void set_up(std::uint32_t environment, bool resumed);
   void run_plugins(Tick from);
   void pass_on_hearing(const SwarmView&);
@@ -129,6 +133,7 @@ class StationEngine {
   Measurement measurement_;
   MeasuredPoses measured_;
   std::vector<PluginOutput> outputs_, outputs_of_set_up_;
+  std::function<void(const std::string& plugin)> tell_;
 };
 
 }  // namespace kilotwin::ark

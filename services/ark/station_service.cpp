@@ -30,6 +30,8 @@ using Clock = std::chrono::steady_clock;
 
 /// For how long the station waits for the other federates' last metrics, s.
 constexpr double kMetricsPatience_s = 5.0;
+/// How often the status tells of a plugin that computes, wall time.
+constexpr auto kStatusPeriod = std::chrono::milliseconds(200);
 /// How often observers get robots' states, wall time.
 constexpr auto kRobotsPeriod = std::chrono::milliseconds(100);
 
@@ -52,6 +54,7 @@ class StationFederate : public Federate {
         robots_(session.participant(), topics::robots()),
         station_packets_(session.participant(), topics::station_packets()),
         swarm_stream_(session.plan(), session.participant()) {
+    engine_.while_plugins_compute([this](const std::string& plugin) { tell_of(plugin); });
     if (!session.plan().any_tracked()) return;
     tracked_.emplace(session.plan(), session.participant(), context);
     tracking_.emplace(session, topics::tracking());
@@ -173,6 +176,16 @@ class StationFederate : public Federate {
   [[nodiscard]] bool was_interrupted() const { return stop_announced_; }
 
  private:
+  /// idle() is not called while a plugin computes, and a station without status counts as dead: controllers of real robots send STOP.
+  void tell_of(const std::string& plugin) {
+    const auto now = Clock::now();
+    if (now < next_status_) return;
+    next_status_ = now + kStatusPeriod;
+    RunProgress progress = this->progress();
+    progress.waiting_for = "the station's plugin " + plugin;
+    publish_status(session_.started() ? kilotwin_open_RUNNING : kilotwin_open_STARTING, progress);
+  }
+
   /// Samples that came until now count for this tick; memberships that they end or begin are announced.
   void follow_tracked(Tick now) {
     const RunPlan& plan = session_.plan();
@@ -281,7 +294,7 @@ class StationFederate : public Federate {
   dds::Writer<PublicStationPacket> station_packets_;
   std::uint64_t packets_published_ = 0;
   const bool records_packets_ = RecordedEvents(session_.plan()).station;
-  Clock::time_point next_robots_{};
+  Clock::time_point next_robots_{}, next_status_{};
   SwarmStream swarm_stream_;
   Pace pace_{session_.plan()};
   Lateness lateness_{session_.plan()};

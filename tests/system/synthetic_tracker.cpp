@@ -38,7 +38,7 @@ void SyntheticTracker::run(const std::stop_token& stop) {
   const auto begun = Clock::now();
   std::exponential_distribution<double> queue(1 / kMeanQueue_s);
   for (std::uint64_t frame = 1; !stop.stop_requested(); ++frame) {
-    const double sent_s = static_cast<double>(frame) / kFrames_per_s;
+    const double sent_s = static_cast<double>(frame) / (kFrames_per_s * kind_.pace);
     const std::chrono::duration<double> due(sent_s + std::min(queue(random_), kLongestQueue_s));
     std::unique_lock lock(mutex);
     wake.wait_until(lock, stop, begun + std::chrono::duration_cast<Clock::duration>(due), [] { return false; });
@@ -52,8 +52,9 @@ void SyntheticTracker::write(std::uint64_t frame, double sent_s) {
     return std::llround((kind_.clock_ahead_s + (1 + kDrift) * t_s) * 1e9);
   };
   doors::TrackedFrame sample{frame, reading_ns(capture_s), reading_ns(sent_s), false, {}};
+  const double run_s = capture_s * kind_.pace;
   for (const CirclingRobot& robot : robots_) {
-    if (capture_s >= robot.from_s && capture_s <= robot.until_s) sample.robots.push_back(see(robot, capture_s));
+    if (run_s >= robot.from_s && run_s <= robot.until_s) sample.robots.push_back(see(robot, run_s));
   }
   writer_.write(sample);
   ++written_;

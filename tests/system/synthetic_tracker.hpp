@@ -27,9 +27,10 @@ struct TrackerKind {
   std::string source = "ceiling";
   double clock_ahead_s = 37;
   double x_mm = 0, y_mm = 0, turn_rad = 0;
+  double pace = 1;  ///< of the run: robots move, and frames come, as many times faster
 };
 
-/// 30 frames a second, written 8 ms after their exposure, and delayed by queues of 2 ms on average. The clock is 50 ppm fast;
+/// 30 frames per second of the run, written 8 ms after their exposure, and delayed by queues of 2 ms on average. The clock is 50 ppm fast;
 /// positions have 0.3 mm of noise.
 class SyntheticTracker {
  public:

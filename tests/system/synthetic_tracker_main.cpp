@@ -1,5 +1,5 @@
-// The tracker of bench/hybrid: robots that circle at 10 mm/s, on a square grid around the origin.
-// Usage: synthetic_tracker DOMAIN FIRST COUNT PITCH_MM. It ends upon SIGINT or SIGTERM.
+// The tracker of bench/hybrid and bench/endurance: robots that circle at 10 mm/s, on a square grid around the origin.
+// Usage: synthetic_tracker DOMAIN FIRST COUNT PITCH_MM [PACE]. PACE: that of the run, default 1. It ends upon SIGINT or SIGTERM.
 #include "tests/system/synthetic_tracker.hpp"
 
 #include <chrono>
@@ -11,8 +11,8 @@
 
 int main(int argc, char** argv) {
   using namespace kilotwin;
-  if (argc != 5) {
-    std::cerr << "usage: synthetic_tracker DOMAIN FIRST COUNT PITCH_MM\n";
+  if (argc != 5 && argc != 6) {
+    std::cerr << "usage: synthetic_tracker DOMAIN FIRST COUNT PITCH_MM [PACE]\n";
     return 2;
   }
   constexpr double kSpeed_mm_s = 10, kRadius_mm = 20;
@@ -32,7 +32,9 @@ int main(int argc, char** argv) {
     robot.phase_rad = n;
   }
   const dds::Participant participant({number(1), {}});
-  test::SyntheticTracker tracker(participant, {}, robots);
+  test::TrackerKind kind;
+  if (argc == 6) kind.pace = std::strtod(argv[5], nullptr);
+  test::SyntheticTracker tracker(participant, kind, robots);
   catch_interrupts();
   tracker.start();
   while (interrupted() == 0) std::this_thread::sleep_for(std::chrono::milliseconds(100));

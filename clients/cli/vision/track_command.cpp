@@ -112,6 +112,29 @@ class Report {
   std::ptrdiff_t most_ = 0;
 };
 
+/// Says once that the robots are too small in the picture, or that there are none for a while.
+class ScaleCheck {
+ public:
+  void look(const track::PictureTracker& tracker, const cv::Size& picture, bool any_robot) {
+    constexpr int kPatience = 3;  ///< frames
+    if (told_ || (!any_robot && ++empty_ < kPatience)) return;
+    told_ = true;
+    tell(tracker, picture);
+  }
+  /// The source has ended.
+  void end(const track::PictureTracker& tracker, const cv::Size& picture) const {
+    if (!told_ && empty_ > 0) tell(tracker, picture);
+  }
+
+ private:
+  static void tell(const track::PictureTracker& tracker, const cv::Size& picture) {
+    const std::string advice = track::scale_advice(tracker.radius_px(picture));
+    if (!advice.empty()) warn("track: " + advice);
+  }
+  bool told_ = false;
+  int empty_ = 0;
+};
+
 /// Numbers of robots by the station's identification.
 class Identifier {
  public:
@@ -222,10 +245,14 @@ int follow_robots(const TrackArguments& arguments) {
   track::PictureTracker tracker(floor);
   track::FrameQueue frames(std::move(source));
   Report report(arguments.quiet);
+  ScaleCheck scale;
+  cv::Size picture;
   const Clock::time_point start = Clock::now();
   while (std::optional<track::CapturedFrame> frame = frames.next([] { return interrupted() != 0; })) {
     if (stream && !live) keep_pace(*frame, start);
     std::vector<track::TrackedRobot> robots = tracker.process(frame->picture, frame->time_s);
+    picture = frame->picture.size();
+    scale.look(tracker, picture, !robots.empty());
     if (identifier) identifier->take(*frame, robots, tracker.follower());
     if (stream) stream->publish(frame->number, frame->capture_ns, robots);
     begin_table();
@@ -235,6 +262,7 @@ int follow_robots(const TrackArguments& arguments) {
   frames.stop();
   begin_table();
   if (table) table->close();
+  scale.end(tracker, picture);
   report.end(frames.dropped());
   return kDone;
 }

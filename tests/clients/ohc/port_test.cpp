@@ -7,14 +7,18 @@
 #include <termios.h>
 #include <unistd.h>
 
+#include <array>
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <future>
 #include <memory>
+#include <thread>
 #include <vector>
 
+#include "clients/ohc/call_limit.hpp"
 #include "clients/ohc/guard.hpp"
 #include "clients/ohc/pseudo_terminal.hpp"
 #include "clients/ohc/serial_port.hpp"
@@ -133,6 +137,60 @@ TEST(SerialPort, SaysWhyItCannotBeOpened) {
   EXPECT_NE(missing.open().find("No such file"), std::string::npos);
   SerialPort file("/dev/null");
   EXPECT_FALSE(file.open().empty());
+}
+
+/// tcdrain() of an adapter that is stuck never returns; no pseudo-terminal shows that, so a pipe stands for it.
+TEST(CallLimit, EndsACallThatWouldNotReturn) {
+  std::array<int, 2> ends{};
+  ASSERT_EQ(pipe(ends.data()), 0);
+  std::atomic<bool> ended{false};
+  // If the limit does nothing, an octet ends the call, and the test fails.
+  std::jthread watchdog([&] {
+    for (int i = 0; i < 200 && !ended; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    static_cast<void>(write(ends[1], "x", 1));
+  });
+  char octet = 0;
+  {
+    const CallLimit limit(std::chrono::milliseconds(30));
+    // One that comes just before a call counts for the call.
+    for (int n = 0; n < 2; ++n) {
+      EXPECT_EQ(read(ends[0], &octet, 1), -1);
+      EXPECT_EQ(errno, EINTR);
+    }
+  }
+  ended = true;
+  watchdog.join();
+  EXPECT_EQ(read(ends[0], &octet, 1), 1) << "afterwards calls are as before";
+  close(ends[0]);
+  close(ends[1]);
+}
+
+TEST(SerialPort, GivesAStalledAdapterUpAndSaysSo) {
+  PseudoTerminal controller;
+  SerialPort port(controller.path(), std::chrono::milliseconds(100));
+  ASSERT_EQ(port.open(), "");
+  controller.hold_back(true);
+  EXPECT_FALSE(port.send({}));
+  EXPECT_NE(port.failure().find("taken no octets for 0.1 s"), std::string::npos) << port.failure();
+  port.close();
+}
+
+/// The guard goes on and serves the adapter when it takes octets again; nobody waits for it for ever.
+TEST(ServePort, AStalledPortIsServedAgainWhenItMoves) {
+  PseudoTerminal controller;
+  PacketDecoder decoder;
+  std::vector<std::uint8_t> pending;
+  SerialPort port(controller.path(), std::chrono::milliseconds(100));
+  ASSERT_EQ(port.open(), "");
+  Guard guard([&](int socket) { serve_port(port, socket); });
+  port.close();
+  controller.hold_back(true);
+  const OverheadPacket packet{OverheadCommand::kRepeat, {5}};
+  ASSERT_TRUE(send_packet(guard.socket(), packet))
+      << "it is confirmed, so that the station's packets do not pile up";
+  EXPECT_TRUE(guard.runs());
+  controller.hold_back(false);
+  EXPECT_EQ(next_packet(controller, decoder, pending), packet) << "what it missed";
 }
 
 TEST(ServePort, ForwardsPacketsAndEndsWithStop) {

@@ -7,6 +7,7 @@
 #include <map>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 #include <sstream>
 
@@ -124,6 +125,21 @@ TEST_F(TrackCommand, PicturesDirectoriesAndVideos) {
   refused({"pictures", "--out", "one.csv"}, "--force");
 }
 
+TEST_F(TrackCommand, RobotsThatAreTooSmallAreTold) {
+  cv::Mat small;
+  const cv::Mat whole = film()[0];
+  constexpr double kRadius_px = 6.5;
+  const double by = kRadius_px / (16.5 * 0.9);
+  cv::resize(whole, small, {}, by, by, cv::INTER_AREA);
+  cv::imwrite(scratch / "small.png", small);
+  cv::imwrite(scratch / "whole.png", whole);
+  const Outcome told = track({"small.png", "--out", "small.csv", "--quiet"});
+  EXPECT_EQ(told.status, 0);
+  EXPECT_NE(told.err.find("radius of 6."), std::string::npos) << told.err;
+  EXPECT_NE(told.err.find("times the resolution"), std::string::npos) << told.err;
+  EXPECT_EQ(track({"whole.png", "--out", "whole.csv", "--quiet"}).err, "");
+}
+
 TEST_F(TrackCommand, ABoardGivesMillimetres) {
   std::filesystem::create_directories(scratch / "board");
   cv::imwrite(scratch / "board/0.png", board(camera()));
@@ -181,7 +197,10 @@ TEST_F(TrackCommand, WhatIsWrongIsSaid) {
   refused({"empty", "--out", "t.csv", "--identify"}, "--identify");
   refused({"empty", "--out", "t.csv", "--calibration", "missing.xml", "--arena", "2000x2000"}, "missing.xml");
   cv::imwrite(scratch / "dark.png", cv::Mat(480, 640, CV_8UC3, cv::Scalar::all(30)));
-  EXPECT_EQ(track({"dark.png", "--out", "dark.csv"}).status, 0);
+  const Outcome dark = track({"dark.png", "--out", "dark.csv"});
+  EXPECT_EQ(dark.status, 0);
+  EXPECT_NE(dark.err.find("no robots are found; their discs must be darker than the floor"), std::string::npos)
+      << dark.err;
   EXPECT_TRUE(rows("dark.csv").empty()) << "a picture without robots is no error";
 }
 

@@ -44,6 +44,14 @@ void step(Driver& robot, double t, double factor_sd, std::mt19937_64& random) {
   robot.heading_rad += 0.5 * turn;
 }
 
+/// A robot that another one holds turns about its centre, at a rate that changes.
+void turn_in_place(Driver& robot, double t) {
+  const Pose before = robot.pose();
+  robot.heading_rad += 0.6 * std::sin(0.7 * t + before.x_mm) * kFrame_s;
+  robot.x_mm = before.x_mm - kAhead_mm * std::cos(robot.heading_rad);
+  robot.y_mm = before.y_mm - kAhead_mm * std::sin(robot.heading_rad);
+}
+
 std::vector<Driver> starting(const Film& film, std::mt19937_64& random) {
   constexpr double kBias_mm_s = 1.86;  // of the ARGoS paper
   std::normal_distribution<double> normal(0, 1);
@@ -101,7 +109,10 @@ std::uint64_t play(const Film& film, const Judge& judge) {
     const double t = frame * kFrame_s;
     cameras::Scene scene;
     for (std::uint32_t i = 0; i < robots.size(); ++i) {
-      if (film.moves) step(robots[i], t, std::sqrt(film.factor_variance_s / kFrame_s), random);
+      if (t >= film.held_from_s)
+        turn_in_place(robots[i], t);
+      else if (film.moves)
+        step(robots[i], t, std::sqrt(film.factor_variance_s / kFrame_s), random);
       show(robots[i], t, film.leds, random);
       cameras::RobotView view;
       view.robot = i;

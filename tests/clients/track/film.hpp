@@ -38,6 +38,8 @@ struct Film {
   std::uint64_t seed = 9;
   /// Variance per second of the factor by which each wheel's speed fluctuates, as factor_variance_s of a model.
   double factor_variance_s = 0;
+  /// From then on something holds the robots: their discs stay, and their motors turn them.
+  double held_from_s = 1e9;
   /// By which the light of a picture is multiplied, by its time; absent: 1.
   std::function<double(double t_s)> light{};
 };

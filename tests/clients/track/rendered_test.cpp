@@ -100,6 +100,35 @@ Film lit_by(double (*light)(double)) {
 
 INSTANTIATE_TEST_SUITE_P(ChangingLight, Rendered, testing::Values(lit_by(cloud), lit_by(lamp)));
 
+/// Robots that are held turn without moving, and their LEDs are dark: the pattern of their bodies alone tells their headings.
+TEST(DarkRobots, ThatTurnInPlaceKeepTheirHeadings) {
+  for (const double px_per_mm : {0.6, 0.9}) {
+    Film film{12, px_per_mm, 3, 0.2, 0.7};
+    film.leds = FilmLeds::kOff;
+    film.held_from_s = 14;
+    film.duration_s = 22;
+    double squares = 0, most = 0;
+    int count = 0;
+    play(film, [&](double t, const std::vector<Driver>& robots, const std::vector<TrackedRobot>& seen) {
+      if (t < film.held_from_s) return;
+      for (const TrackedRobot& one : seen) {
+        double off = 0;
+        const Driver* robot = robot_at(robots, one.position, &off);
+        if (robot == nullptr || !one.heading) continue;
+        const double error = wrapped(one.heading->heading_rad - wrapped(robot->heading_rad));
+        squares += error * error;
+        most = std::max(most, std::abs(error));
+        ++count;
+      }
+    });
+    const double rms_deg = 180 / kPi * std::sqrt(squares / std::max(1, count));
+    std::printf("held and dark, %.1f px/mm: heading %.2f deg, at most %.1f deg\n", px_per_mm, rms_deg,
+                180 / kPi * most);
+    EXPECT_GT(count, 11 * 8 * 30);
+    EXPECT_LT(rms_deg, 10);
+  }
+}
+
 // A third of the LEDs are dark beside lit ones of neighbours that they touch: the neighbours' glow is not theirs.
 TEST(Crowd, RobotsThatTouchKeepTheirColours) {
   constexpr double kPitch_mm = 33.3, kSide_mm = 400;

@@ -155,6 +155,18 @@ TEST_F(GatewayTest, RefusesOtherHostsAndOrigins) {
   expect_alive();
 }
 
+/// Browsers send the name in small letters, however --listen has it.
+TEST_F(GatewayTest, ItsNameMayHaveCapitals) {
+  http::Endpoint endpoint;
+  endpoint.host = "LocalHost";
+  gateway_ = std::make_unique<Gateway>(endpoint, kToken, PageFiles(scratch_.path() / "page"));
+  gateway_->show(*run_, run_->text());
+  const std::string own = "http://localhost:" + std::to_string(port());
+  EXPECT_NE(get("/", own.substr(7)).find(" 200 "), std::string::npos);
+  EXPECT_NE(get("/", "evil.example").find(" 403 "), std::string::npos);
+  EXPECT_TRUE(WebSocketClient(port(), {.host = "localhost", .origin = own}).open());
+}
+
 TEST_F(GatewayTest, AnswersWithTheStateAtATick) {
   WebSocketClient viewer(port());
   const auto run = viewer.await("run");

@@ -59,6 +59,7 @@ class Scene {
     bodies_[0].x_mm[robot] = x_mm;
     bodies_[0].y_mm[robot] = y_mm;
   }
+  void set_led(std::uint32_t robot, std::uint8_t led) { actuation_[0].led[robot] = led; }
   void set_life(std::uint32_t robot, LifeCycle life) {
     actuation_[0].life_cycle[robot] = static_cast<std::uint8_t>(life);
   }
@@ -88,6 +89,16 @@ class Scene {
   std::vector<const ActuationFrame*> actuation_frames_;
   SwarmView swarm_;
 };
+
+void expect_equal(const SeenRobots& a, const SeenRobots& b) {
+  EXPECT_EQ(a.x_mm, b.x_mm);
+  EXPECT_EQ(a.y_mm, b.y_mm);
+  EXPECT_EQ(a.heading_rad, b.heading_rad);
+  EXPECT_EQ(a.vx_mm, b.vx_mm);
+  EXPECT_EQ(a.vy_mm, b.vy_mm);
+  EXPECT_EQ(a.led, b.led);
+  EXPECT_EQ(a.seen, b.seen);
+}
 
 bool equal(const OverheadPacket& a, const OverheadPacket& b) {
   return a.command == b.command && a.message == b.message && a.offset == b.offset;
@@ -230,6 +241,7 @@ TEST(StationEngine, ARobotThatIsAbsentIsNotSeenAndGetsNoMessages) {
     EXPECT_FALSE(is_seen());
     EXPECT_NE(scene.station.seen().seen[1], 0);
     scene.place(2, 500, 100);
+    scene.set_led(2, 3 << 4);
     scene.set_life(2, LifeCycle::kRunning);
     EXPECT_FALSE(scene.messages_to(2, 100).empty());
     EXPECT_TRUE(is_seen());
@@ -238,6 +250,8 @@ TEST(StationEngine, ARobotThatIsAbsentIsNotSeenAndGetsNoMessages) {
     static_cast<void>(scene.messages_to(2, 40));  // one may have waited
     EXPECT_FALSE(is_seen());
     EXPECT_TRUE(scene.messages_to(2, 100).empty());
+    // Plugins may still ask what was seen of it last.
+    EXPECT_EQ(scene.station.seen().led[2], LedClass::kBlue);
     // It is lifted to another place. That is no speed, also where the run is resumed in between.
     proto::StationState part;
     scene.station.save(part);
@@ -245,8 +259,10 @@ TEST(StationEngine, ARobotThatIsAbsentIsNotSeenAndGetsNoMessages) {
     Scene loaded(plan);
     loaded.station.load(scene.now, parts);
     loaded.now = scene.now;
+    expect_equal(loaded.station.seen(), scene.station.seen());
     for (Scene* const one : {&scene, &loaded}) {
       one->place(2, -500, 100);
+      one->set_led(2, 3 << 4);
       one->set_life(2, LifeCycle::kRunning);
       for (int k = 0; k < 8 && one->station.seen().seen[2] == 0; ++k) one->step();
       const SeenRobots& seen = one->station.seen();

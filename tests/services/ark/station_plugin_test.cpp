@@ -45,6 +45,7 @@ struct Experiment : KilobotExperiment {
     if (what == "overflow") deep(0);
     if (what == "close") for (int i = 3; i < 200; ++i) close(i);
     if (what == "throw 3") throw 3;
+    if (what.rfind("until ", 0) == 0) while (access(what.c_str() + 6, F_OK) != 0) usleep(10000);
     if (what == "stranger") signalKilobot(make_message(7, 1, 1));
     if (what == "wait") { FILE* p = popen("sleep 100", "r"); fgetc(p); }
     if (what == "print") { std::printf("%0300d\n", 7); std::fflush(stdout); }
@@ -108,6 +109,19 @@ TEST_F(StationPlugin, RunsInAProcessOfItsOwn) {
   EXPECT_EQ(it.sense({2, {}}), (ArkMessage{2, 1, 3}));
   EXPECT_EQ(it.load(state).failure, "");
   EXPECT_EQ(it.sense({2, {}}), (ArkMessage{2, 1, 3}));
+}
+
+/// The station shows meanwhile that it lives.
+TEST_F(StationPlugin, TheStationIsCalledWhileAPluginComputes) {
+  int calls = 0;
+  PluginPatience patience;
+  patience.while_waiting = [&] {
+    // The plugin waits for this file.
+    if (++calls == 3) std::ofstream(scratch_ / "go") << "go";
+  };
+  PluginBench it = bench("until " + (scratch_ / "go").string(), patience);
+  EXPECT_EQ(it.step({3, {}}).failure, "");
+  EXPECT_GE(calls, 3);
 }
 
 TEST_F(StationPlugin, ACrashNamesTheFunctionAndTheRobot) {

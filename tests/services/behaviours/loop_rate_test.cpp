@@ -106,6 +106,24 @@ TEST(LoopRate, FlashesWithinATickAreSeenAsOftenAsTheyLast) {
   EXPECT_NEAR(seen / double{kTicks}, 20 / 32.77, 0.08);
 }
 
+/// A parked program is not called any more: the sample of its last tick must not stay.
+TEST(LoopRate, RobotsThatParkInTheTickOfAFlashShowTheirLastColour) {
+  // main() ends a moment after the flash, at another time of the tick in each robot.
+  constexpr std::uint32_t kRobots = 24;
+  Swarm swarm(
+      {"#include <kilolib.h>\n"
+       "int main(void) { kilo_init(); delay(200 + 3 * kilo_uid); set_color(3); delay(10); set_color(0); }\n"},
+      kRobots, 1, "",
+      [](proto::Manifest& manifest) { manifest.mutable_experiment()->mutable_robots(0)->clear_loop_rate(); });
+  int flashes = 0;
+  for (int k = 0; k < 20; ++k) {
+    swarm.step();
+    for (std::uint32_t robot = 0; robot < kRobots; ++robot) flashes += swarm.led(robot) != 0 ? 1 : 0;
+  }
+  EXPECT_GT(flashes, 0) << "flashes are seen as often as they last";
+  for (std::uint32_t robot = 0; robot < kRobots; ++robot) EXPECT_EQ(swarm.led(robot), 0) << robot;
+}
+
 TEST(LoopRate, DelaysKeepTheirTime) {
   // Two states that are equal before and after each call: their delays must not be skipped.
   Robot robot("static void loop(void) { set_color(1); delay(500); set_color(0); delay(500); }\n");
