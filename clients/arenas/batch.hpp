@@ -35,7 +35,7 @@ class Batch {
 
   /// All arenas that have not ended; each goes as far as its experiment does.
   void step(std::int64_t ticks);
-  /// Arenas begin anew, each with the seed beside it.
+  /// Restarts arenas, each with the seed given beside it.
   void reset(std::span<const std::pair<std::uint32_t, std::uint64_t>> seeds);
   void send(std::span<const std::uint32_t> arenas, const OverheadPacket& packet);
   /// As Arena::place() in each of them. Throws UserError; then none has taken it.

@@ -83,7 +83,7 @@ void RunMonitor::state(const SwarmView& swarm) {
     alarms_.push_back(std::move(alarm));
   }
   if (table_.empty()) return;
-  // Alarms are rare: the files are written anew, each whole at any time.
+  // Alarms are rare: each time, the files are rewritten and replaced whole.
   os::write_file(table_, rows_);
   os::write_file(alarm_lines(table_), lines_);
 }

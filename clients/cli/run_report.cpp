@@ -317,7 +317,7 @@ void add_tracking(Data& page, const Summary& s) {
   Facts facts{{"membership", fmt::format("{} joined, {} left, {} lost", t.joined, t.left, t.lost)},
               {"from arrival to effect",
                fmt::format("{} (p50), {} (p99)", milliseconds(t.effect_p50_s), milliseconds(t.effect_p99_s))},
-              {"estimates begun anew", std::to_string(t.jumps)},
+              {"restarted estimates", std::to_string(t.jumps)},
               {"messages heard of real robots", std::to_string(t.heard)}};
   if (!s.monitor.empty()) {
     const auto monitor = nlohmann::json::parse(s.monitor);

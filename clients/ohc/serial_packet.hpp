@@ -40,7 +40,7 @@ class PacketDecoder {
 
   /// Takes the next octet. Returns the packet that it ends, if that is whole and of a known type.
   [[nodiscard]] std::optional<OverheadPacket> take(std::uint8_t octet);
-  /// Starts anew: what has come so far belongs to no packet. Counters stay.
+  /// Discards the octets received so far; they belong to no packet. Counters keep their values.
   void forget();
   [[nodiscard]] const Counters& counters() const { return counters_; }
 

@@ -38,7 +38,7 @@ class Reader {
   [[nodiscard]] const proto::StateRecord* next_state();
   /// Returns to the first record after the header.
   void rewind();
-  /// Continues with the record whose frame begins at `offset`: StateIndex knows where. The order of states begins anew.
+  /// Continues with the record whose frame begins at `offset`: StateIndex knows where. The check of ascending ticks restarts.
   void go_to(std::uint64_t offset);
 
   /// After next() returned nullptr: whether the end mark of the run was reached. Without end mark and warning, the run was

@@ -110,7 +110,7 @@ struct TrackingTotals {
   /// The same from the middle of the sample's exposure, s.
   double exposed_p50_s = 0, exposed_p99_s = 0;
   std::uint64_t joined = 0, left = 0, lost = 0;
-  std::uint64_t jumps = 0;                 ///< samples contradicted an estimate, which began anew
+  std::uint64_t jumps = 0;                 ///< estimates restarted because samples contradicted them
   double wait_p50_s = 0, wait_p99_s = 0;   ///< arrival to the publication of the frame that it joins
   double step_p50_s = 0, step_p99_s = 0;   ///< that publication to the poses that follow from it
   std::uint64_t heard = 0;                 ///< messages of real robots that listeners heard

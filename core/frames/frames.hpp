@@ -155,7 +155,7 @@ struct MembershipChange {
 };
 
 /// A simulated robot or a movable body is placed elsewhere, as by hand: its pose after a step. The step's motion of the body
-/// is lost, it stands still, and the effects' memory of the robot begins anew.
+/// is lost, it stands still, and the effects' memory of the robot is reset.
 struct Relocation {
   bool movable = false;  ///< whether `body` is the number of a movable body, else that of a robot
   std::uint32_t body = 0;

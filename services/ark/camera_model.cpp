@@ -128,7 +128,7 @@ void CameraModel::lose(std::uint32_t track) {
   tracked_.seen[track] = it.lost_until <= frame_ ? 1 : 0;
 }
 
-/// The track is lost in this frame, and its buffers begin anew.
+/// The track is lost in this frame, and its buffers are cleared.
 void CameraModel::forget(std::uint32_t track) {
   tracks_[track].positions.clear();
   tracks_[track].motions.clear();

@@ -8,7 +8,7 @@
 ///   means, then averaged over the last five values, the newest with the largest weight;
 /// - its heading is the direction of that velocity, and stays where there is none;
 /// - its LED's class may be mistaken for another; the most frequent class of five frames is shown, of several the lowest;
-/// - the tracker may lose it for a while: nothing of it changes then, and its buffers begin anew;
+/// - the tracker may lose it for a while: its state then does not change, and its buffers are cleared;
 /// - a tracked robot that is absent is as good as lost;
 /// - two robots that are seen close to each other may change identities.
 #pragma once

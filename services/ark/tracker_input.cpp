@@ -154,7 +154,7 @@ void TrackerInput::watch(Source& source, const Waiting& waiting) {
     // Of a clock that is set again and again, fewer and fewer lines.
     if (std::has_single_bit(source.restarts)) {
       say(fmt::format(
-          "tracker {}: it started anew, or its clock was set ({} times so far); its time is estimated again",
+          "tracker {}: it restarted, or its clock was set ({} times so far); its time is estimated again",
           source.name, source.restarts));
     }
   }

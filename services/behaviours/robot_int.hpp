@@ -1,5 +1,5 @@
 /// Gives programs the integers of the robot: int and unsigned have 16 bits, long has 32. Values that are stored in an int wrap as on
-/// the robot, and the line is told.
+/// the robot, and the line is reported.
 #pragma once
 
 #include <string>

@@ -9,7 +9,7 @@
 /// exceeds its tx_period. If carrier sense detects a packet, it waits for its next interrupt. Otherwise it sends its start
 /// pulse. It is deaf for two bits. If it then detects another start pulse in the rest of the leading octet, it gives up, and
 /// its timer interrupts it once more after a random time (back-off). Such a pulse is of a robot that does not hear it. A
-/// packet that reaches its end is a success: tx_clock restarts, and the host is told.
+/// packet that reaches its end is a success: tx_clock restarts, and the host is notified.
 ///
 /// Receiving. Every robot that hears the sender (link_budget.hpp) receives a packet, unless another signal that it hears
 /// overlaps in time: another packet, the start pulse of an aborted packet, a packet of the overhead controller, or its own

@@ -26,7 +26,7 @@ class LogPlayer {
     std::int64_t after_ns = 0;  ///< since the beginning of the play; never descends
     TrackedFrame frame;         ///< captured at `after_ns` on a clock that shows 0 at the beginning
   };
-  /// `speed`: how many times faster than it was logged. With `loop`, the log begins anew at its end, for ever; the pause
+  /// `speed`: how many times faster than it was logged. With `loop`, the log restarts at its end, for ever; the pause
   /// is as long as a mean period of its rows. `door` must outlive it.
   LogPlayer(const Door& door, std::filesystem::path file, const LogExtent& extent, double speed, bool loop);
   [[nodiscard]] std::optional<Due> next();

@@ -12,8 +12,9 @@
 
 namespace kilotwin::doors::ros2 {
 
-/// Poses of all robots at one time, out of samples that come one by one and may be lost. A robot whose sample was lost keeps its
-/// last pose; there is no snapshot until every robot was seen once. Another run, or a time that goes back, begins anew.
+/// Collects samples, which arrive one by one and may be lost, into snapshots of all robots' poses at one time. A robot whose sample
+/// was lost keeps its last pose. The first snapshot comes after every robot was seen once. A new run, or a time before the last
+/// one, resets the collection.
 class Snapshots {
  public:
   struct Pose {

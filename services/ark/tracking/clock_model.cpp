@@ -8,7 +8,7 @@ namespace kilotwin::ark {
 namespace {
 
 constexpr double kWindow_s = 120, kBucket_s = 1;
-/// Frames with lower numbers than the last one are late if they are near it; else the source counts anew.
+/// Frames with lower numbers than the last one are late if they are near it; otherwise the source has restarted its numbering.
 constexpr std::uint64_t kReordered = 16;
 /// After so much time the line is trusted, and a sample that arrives so much too early, or too late, contradicts it.
 constexpr double kTrusted_s = 5, kTooEarly_ns = -20e6, kTooLate_ns = 1e9;

@@ -45,7 +45,7 @@ class ClockModel {
   [[nodiscard]] std::int64_t offset_ns() const;
   /// How much slower the source's clock is than the station's, parts per million.
   [[nodiscard]] double drift_ppm() const { return slope_ * 1e6; }
-  /// How often the source started anew or its clock was set.
+  /// Number of restarts of the source or of changes to its clock.
   [[nodiscard]] std::uint32_t restarts() const { return restarts_; }
   /// Samples that were not used because of their time.
   [[nodiscard]] std::uint64_t refused() const { return refused_; }

@@ -50,7 +50,7 @@ class TrackedSwarm {
   /// Throws RunError where the robots are others.
   void load(Tick tick, const proto::StationState& state);
 
-  /// Estimates that began anew because samples contradicted them, since the start; not part of the state.
+  /// Number of estimates that were restarted because samples contradicted them, since the start; not part of the state.
   [[nodiscard]] std::uint64_t jumps() const { return jumps_; }
 
  private:

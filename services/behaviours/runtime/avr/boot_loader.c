@@ -1,7 +1,7 @@
 /* The Kilobot's boot loader, in the flash's boot section: takes a program from the overhead controller, page by page, and
  * starts it. Linked with kilolib.c, which under KILO_BOOT_LOADER hands it every message.
  *
- * BOOT starts it anew. A message of type BOOTPGM_SIZE tells the number of pages; one of type BOOTPGM_PAGE brings six octets of
+ * BOOT restarts it. A message of type BOOTPGM_SIZE tells the number of pages; one of type BOOTPGM_PAGE brings six octets of
  * one. A page for which 128 octets have come without those of another page in between is written, once. When all are
  * written, the program starts; so it does upon any other message as long as none is. */
 #include <avr/boot.h>
