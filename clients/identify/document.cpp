@@ -418,7 +418,9 @@ json contract_of(const Findings& f, const MeasuredSet& judged, double horizon_s)
   contract["noise_floor_mm"] = f.expected_mm;
   contract["noise_floor_how"] =
       "the error that the model with effects predicts for itself: filter uncertainty at the start, process noise "
-      "over the horizon and tracker noise, all estimated from one-step innovations";
+      "over the horizon and tracker noise, all estimated from one-step innovations; what persists from one "
+      "innovation "
+      "to the next does not count as noise";
   if (f.replicates) {
     contract["replicates"] = {{"floor_mm", f.replicates->floor_mm},
                               {"repeatable_mm", f.replicates->repeatable_mm},

@@ -41,7 +41,8 @@ struct Findings {
   std::optional<ErrorBounds> bounds;  ///< of their errors
   /// The same errors of robots that stayed away from walls and from each other over the horizon.
   PredictionErrors free_before, free_after;
-  double expected_mm = 0;  ///< error that the written model expects of itself
+  Noise white;             ///< of the written model, without what persists from sample to sample
+  double expected_mm = 0;  ///< error that the written model expects of itself with this noise
   std::optional<Replicates> replicates;
   std::vector<double> rmse_without_mm;  ///< by term, on held-out data; empty if nothing is held out
   FinalCheck check;

@@ -8,6 +8,7 @@
 #include "clients/identify/document.hpp"
 #include "clients/identify/findings.hpp"
 #include "clients/identify/fit/fitter.hpp"
+#include "clients/identify/fit/persistent_residuals.hpp"
 #include "clients/identify/fit/posterior_draws.hpp"
 #include "clients/identify/last_check.hpp"
 #include "clients/identify/model/model_file.hpp"
@@ -30,9 +31,19 @@ std::vector<Window> fitted_windows(const FitState& fit, const std::vector<Foreca
   return windows_of(fit.tracks, of_fit, horizon_s);
 }
 
+/// The model as it would be if only the white part of its process noise were noise: it expects smaller errors of itself.
+FitState with_white_noise(const Fitter& fitter, const FitState& fit) {
+  FitState white = fit;
+  white.model.noise = white_part(fit.model.noise, persistent_share(fitter, fit));
+  return white;
+}
+
 /// Errors, their intervals and floors, and what remains unexplained.
-void assess(Findings& f, const MeasuredSet& train, const MeasuredSet* test, const Evaluation& evaluation,
-            const ForecastTimes& times, std::uint32_t threads) {
+void assess(Findings& f, const Fitter& fitter, const MeasuredSet& train, const MeasuredSet* test,
+            const Evaluation& evaluation, const ForecastTimes& reported) {
+  ForecastTimes times = reported;
+  times.rollouts = 0;
+  const std::uint32_t threads = fitter.threads();
   const std::vector<Forecast> fitted =
       forecast(f.found.fit.model, f.found.fit.tracks, times, Tracks::kAll, threads);
   const auto errors_of_free = [&](const Judged& judged) {
@@ -42,7 +53,15 @@ void assess(Findings& f, const MeasuredSet& train, const MeasuredSet* test, cons
   f.free_before = errors_of_free(f.before);
   f.free_after = errors_of_free(f.after);
   f.bounds = bounds_of(evaluation.set(), f.before.errors, f.after.errors);
-  f.expected_mm = (gives_errors(f.held_out) ? f.after.errors : errors_of(train, fitted)).expected_mm();
+  const FitState white = with_white_noise(fitter, f.found.fit);
+  f.white = white.model.noise;
+  if (gives_errors(f.held_out)) {
+    f.after.errors.expected_mm2 = evaluation.judge(white, reported).errors.expected_mm2;
+    f.expected_mm = f.after.errors.expected_mm();
+  } else {
+    f.expected_mm =
+        errors_of(train, forecast(white.model, white.tracks, times, Tracks::kAll, threads)).expected_mm();
+  }
   std::vector<std::pair<const MeasuredSet*, const std::vector<Forecast>*>> all{{&train, &fitted}};
   if (test != nullptr) all.emplace_back(test, &f.after.forecasts);
   f.replicates = replicates_of(all, times.horizon_s);
@@ -60,12 +79,14 @@ nlohmann::json horizon_curve(const Findings& f, const Evaluation& evaluation, st
     const auto errors = [&](const MotionModel& model, const PreparedSet& tracks) {
       return errors_of(evaluation.set(), forecast(model, tracks, at, evaluation.of(), threads));
     };
+    MotionModel white = f.found.fit.model;
+    white.noise = f.white;
     const PredictionErrors was = errors(f.base.model, f.before.tracks),
                            is = errors(f.found.fit.model, f.after.tracks);
     curve["at_s"].push_back(ahead_s);
     curve["before_mm"].push_back(was.rmse_mm());
     curve["after_mm"].push_back(is.rmse_mm());
-    curve["floor_mm"].push_back(is.expected_mm());
+    curve["floor_mm"].push_back(errors(white, f.after.tracks).expected_mm());
   }
   return curve;
 }
@@ -101,7 +122,11 @@ Search found_by_search(const Fitter& fitter, const FitState& base, const Measure
     const std::vector<Forecast> all = forecast(fit.model, fit.tracks, times, Tracks::kFit, options.threads);
     // What robots do in contact is uncertain, and no effect.
     const std::vector<Forecast> free = free_ones(fit.model, fit.tracks, all, options.horizon_s);
-    return leaves_systematic_error(train, windows_of(fit.tracks, free, options.horizon_s), errors_of(train, free));
+    PredictionErrors errors = errors_of(train, free);
+    const FitState white = with_white_noise(fitter, fit);
+    const std::vector<Forecast> sure = forecast(white.model, fit.tracks, times, Tracks::kFit, options.threads);
+    errors.expected_mm2 = errors_of(train, free_ones(fit.model, fit.tracks, sure, options.horizon_s)).expected_mm2;
+    return leaves_systematic_error(train, windows_of(fit.tracks, free, options.horizon_s), errors);
   };
   const auto progress = [&](double part, const std::string& what) {
     if (options.progress) options.progress(0.1 + 0.75 * part, what);
@@ -179,7 +204,7 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
     for (Track& track : run.tracks) track.held_out = track.chooses = false;
   choose_and_judge(f, fitter, train, test != nullptr ? all_fitted : train, evaluation, reported);
   say_progress(0.91, "what is left unexplained");
-  assess(f, train, test, evaluation, times, options.threads);
+  assess(f, fitter, train, test, evaluation, reported);
   f.numbering = numbering_of(fitter, f.base);
   // An effect that the base model lacks makes the robots' speeds differ from run to run.
   if (f.numbering.anew()) f.numbering = numbering_of(fitter, f.found.fit);

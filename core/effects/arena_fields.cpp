@@ -1,6 +1,8 @@
 #include "core/effects/arena_fields.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
 
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
@@ -12,6 +14,14 @@ namespace kilotwin {
 using Counts = ArenaFieldSettings::Counts;
 
 namespace {
+
+/// A trail's cell has two entries: the two robots that passed last.
+std::size_t entries_of(Counts counts) { return counts == Counts::kTrail ? 2 : 1; }
+
+/// Lowest corner of a cell along an axis, at or before the arena's side `low_mm`.
+double first_corner_mm(double low_mm, const std::optional<double>& corner_mm, double cell_mm) {
+  return corner_mm ? *corner_mm - std::ceil((*corner_mm - low_mm) / cell_mm) * cell_mm : low_mm;
+}
 
 std::uint32_t clamped_cell(double cells, std::uint32_t count) {
   if (!(cells >= 1)) return 0;
@@ -29,11 +39,11 @@ ArenaFields::ArenaFields(const RunPlan& plan, PartitionId partition, double reac
     Field field{};
     field.counts = given.counts;
     field.cells_per_mm = 1 / given.cell_mm;
-    field.x0_mm = -width_mm / 2;
-    field.y0_mm = -height_mm / 2;
+    field.x0_mm = first_corner_mm(-width_mm / 2, given.corner_x_mm, given.cell_mm);
+    field.y0_mm = first_corner_mm(-height_mm / 2, given.corner_y_mm, given.cell_mm);
     field.forget_ticks = given.forget_s / plan.tick_length.seconds();
-    field.columns = static_cast<std::uint32_t>(width_mm * field.cells_per_mm) + 1;
-    field.rows = static_cast<std::uint32_t>(height_mm * field.cells_per_mm) + 1;
+    field.columns = static_cast<std::uint32_t>((width_mm / 2 - field.x0_mm) * field.cells_per_mm) + 1;
+    field.rows = static_cast<std::uint32_t>((height_mm / 2 - field.y0_mm) * field.cells_per_mm) + 1;
     const auto column = [&](double x_mm) {
       return clamped_cell((x_mm - field.x0_mm) * field.cells_per_mm, field.columns);
     };
@@ -44,7 +54,7 @@ ArenaFields::ArenaFields(const RunPlan& plan, PartitionId partition, double reac
     field.first_row = row(rectangle.y_min_mm - reach_mm);
     field.width = column(rectangle.x_max_mm + reach_mm) - field.first_column + 1;
     field.height = row(rectangle.y_max_mm + reach_mm) - field.first_row + 1;
-    field.cells.resize(std::size_t{field.width} * field.height);
+    field.cells.resize(entries_of(field.counts) * field.width * field.height);
     if (field.counts == Counts::kVisits) field.slot = plan.memory.index_of({MemorySlot::Kind::kFieldCell, 0, i});
     fields_.push_back(std::move(field));
   }
@@ -65,7 +75,8 @@ std::int64_t ArenaFields::index_of(const Field& field, std::uint32_t cell) {
   const std::uint32_t column = cell % field.columns - field.first_column,
                       row = cell / field.columns - field.first_row;
   // Unsigned subtraction makes cells before the first one huge, so one comparison suffices.
-  return column < field.width && row < field.height ? std::int64_t{row} * field.width + column : -1;
+  if (column >= field.width || row >= field.height) return -1;
+  return (std::int64_t{row} * field.width + column) * static_cast<std::int64_t>(entries_of(field.counts));
 }
 
 bool ArenaFields::is_own(const Field& field, std::uint32_t cell) const {
@@ -79,17 +90,30 @@ double ArenaFields::faded(const Field& field, const Cell& cell, Tick now) {
   return cell.value * kt_exp(static_cast<double>(cell.tick - now.count()) / field.forget_ticks);
 }
 
-double ArenaFields::value(std::uint32_t number, double x_mm, double y_mm, Tick now) const {
+double ArenaFields::value(std::uint32_t number, std::uint32_t robot, double x_mm, double y_mm, Tick now) const {
   const Field& field = fields_[number];
   const std::int64_t index = index_of(field, cell_of(field, x_mm, y_mm));
   KILOTWIN_DEMAND(index >= 0);
-  return faded(field, field.cells[static_cast<std::size_t>(index)], now);
+  const Cell* const cell = &field.cells[static_cast<std::size_t>(index)];
+  if (field.counts != Counts::kTrail) return faded(field, *cell, now);
+  const Cell& other = cell[cell->value == robot + 1.0 ? 1 : 0];
+  return other.value == 0 ? 0 : kt_exp(static_cast<double>(other.tick - now.count()) / field.forget_ticks);
 }
 
-std::uint64_t ArenaFields::hash_of(std::uint32_t field, std::uint32_t number, const Cell& cell) {
-  if (cell.value == 0) return 0;
-  return entity_hash(HashDomain::kArenaField, number,
-                     {field, hash_bits(cell.value), static_cast<std::uint64_t>(cell.tick)});
+void ArenaFields::pass(Cell* cell, std::uint32_t robot, Tick now) {
+  const Cell passage{robot + 1.0, now.count()};
+  if (cell->value != passage.value) cell[1] = cell[0];
+  cell[0] = passage;
+}
+
+std::uint64_t ArenaFields::hash_of(std::uint32_t field, std::uint32_t number, const Cell* cell) const {
+  std::uint64_t sum = 0;
+  for (std::size_t e = 0; e < entries_of(fields_[field].counts); ++e) {
+    if (cell[e].value == 0) continue;
+    sum += entity_hash(HashDomain::kArenaField, number,
+                       {field, hash_bits(cell[e].value), static_cast<std::uint64_t>(cell[e].tick)});
+  }
+  return sum;
 }
 
 void ArenaFields::count(Tick now, const RobotColumns& robots, std::span<double> memory) {
@@ -98,7 +122,8 @@ void ArenaFields::count(Tick now, const RobotColumns& robots, std::span<double> 
     Field& field = fields_[f];
     for (std::size_t i = 0; i < robots.size(); ++i) {
       if (field.counts != Counts::kPresentTime && robots.tracked[i] != 0) continue;
-      if (field.counts == Counts::kDrivenTime && !robots.duties[i].any()) continue;
+      const bool of_driven = field.counts == Counts::kDrivenTime || field.counts == Counts::kTrail;
+      if (of_driven && !robots.duties[i].any()) continue;
       const std::uint32_t number = cell_of(field, robots.x_mm[i], robots.y_mm[i]);
       double amount = plan_.tick_length.seconds();
       if (field.counts == Counts::kVisits) {
@@ -109,10 +134,13 @@ void ArenaFields::count(Tick now, const RobotColumns& robots, std::span<double> 
       }
       const std::int64_t index = index_of(field, number);
       if (index < 0) continue;
-      Cell& cell = field.cells[static_cast<std::size_t>(index)];
+      Cell* const cell = &field.cells[static_cast<std::size_t>(index)];
       const bool own = is_own(field, number);
       if (own) hash_ -= hash_of(f, number, cell);
-      cell = {faded(field, cell, now) + amount, field.forget_ticks > 0 ? now.count() : 0};
+      if (field.counts == Counts::kTrail)
+        pass(cell, robots.robot[i], now);
+      else
+        *cell = {faded(field, *cell, now) + amount, field.forget_ticks > 0 ? now.count() : 0};
       if (own) hash_ += hash_of(f, number, cell);
     }
   }
@@ -121,8 +149,9 @@ void ArenaFields::count(Tick now, const RobotColumns& robots, std::span<double> 
 void ArenaFields::save(proto::PhysicsState& state) const {
   for (std::uint32_t f = 0; f < fields_.size(); ++f) {
     const Field& field = fields_[f];
-    for (std::size_t index = 0; index < field.cells.size(); ++index) {
-      const Cell& cell = field.cells[index];
+    for (std::size_t entry = 0; entry < field.cells.size(); ++entry) {
+      const Cell& cell = field.cells[entry];
+      const std::size_t index = entry / entries_of(field.counts);
       const auto row = static_cast<std::uint32_t>(index / field.width),
                  column = static_cast<std::uint32_t>(index % field.width);
       const std::uint32_t number = (row + field.first_row) * field.columns + column + field.first_column;
@@ -148,8 +177,11 @@ void ArenaFields::load(std::span<const proto::PhysicsState* const> parts) {
         throw RunError("checkpoint: physics: unknown cell of a field");
       const std::int64_t index = index_of(fields_[f], number);
       if (index < 0) continue;
-      const Cell cell{part->field_value(i), part->field_tick(i)};
-      fields_[f].cells[static_cast<std::size_t>(index)] = cell;
+      Cell* cell = &fields_[f].cells[static_cast<std::size_t>(index)];
+      if (is_own(fields_[f], number)) hash_ -= hash_of(f, number, cell);
+      const Cell entry{part->field_value(i), part->field_tick(i)};
+      // The entries of a trail's cell come in their order.
+      cell[entries_of(fields_[f].counts) == 2 && cell->value != 0 ? 1 : 0] = entry;
       if (is_own(fields_[f], number)) hash_ += hash_of(f, number, cell);
     }
   }

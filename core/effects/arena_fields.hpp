@@ -28,8 +28,8 @@ class ArenaFields {
   /// Distance from a position within which robots may be in the same cell, mm.
   [[nodiscard]] static double margin_mm(const RunPlan&);
 
-  /// Value of the cell at a position within reach, at tick `now`.
-  [[nodiscard]] double value(std::uint32_t field, double x_mm, double y_mm, Tick now) const;
+  /// Value that a robot reads of the cell at a position within reach, at tick `now`.
+  [[nodiscard]] double value(std::uint32_t field, std::uint32_t robot, double x_mm, double y_mm, Tick now) const;
   /// Counts the robots for the step from tick `now`. Fields of VISITS write the cell into `memory`, which is also the memory
   /// of `robots`.
   void count(Tick now, const RobotColumns& robots, std::span<double> memory);
@@ -43,8 +43,8 @@ class ArenaFields {
 
  private:
   struct Cell {
-    double value = 0;
-    std::int64_t tick = 0;  ///< tick for which `value` holds; it decays afterwards
+    double value = 0;       ///< TRAIL: 1 + number of the robot that passed
+    std::int64_t tick = 0;  ///< tick for which `value` holds; it decays afterwards. TRAIL: of the passage
   };
   struct Field {
     ArenaFieldSettings::Counts counts;
@@ -53,16 +53,18 @@ class ArenaFields {
     std::uint32_t columns, rows;                           ///< of the whole arena
     std::uint32_t first_column, first_row, width, height;  ///< of the part that is kept
     std::uint32_t slot;                                    ///< slot of the robots' memory, for VISITS
-    std::vector<Cell> cells;
+    std::vector<Cell> cells;                               ///< TRAIL: two per cell, the later passage first
   };
 
   /// Index of the cell in the arena; positions outside belong to the outermost cells.
   [[nodiscard]] static std::uint32_t cell_of(const Field&, double x_mm, double y_mm);
-  /// Index of the cell in Field::cells; -1: not kept.
+  /// Index of the cell's first entry in Field::cells; -1: not kept.
   [[nodiscard]] static std::int64_t index_of(const Field&, std::uint32_t cell);
   [[nodiscard]] bool is_own(const Field&, std::uint32_t cell) const;
   [[nodiscard]] static double faded(const Field&, const Cell&, Tick now);
-  [[nodiscard]] static std::uint64_t hash_of(std::uint32_t field, std::uint32_t cell, const Cell&);
+  /// Enters a passage; the robots of a tick come in ascending order.
+  static void pass(Cell* cell, std::uint32_t robot, Tick now);
+  [[nodiscard]] std::uint64_t hash_of(std::uint32_t field, std::uint32_t number, const Cell* cell) const;
 
   const RunPlan& plan_;
   PartitionId partition_;

@@ -114,7 +114,9 @@ Range Covariates::range(std::uint32_t index) const {
     case Covariate::kNearest: return {0, column.radius_mm};
     case Covariate::kRobot: return {0, static_cast<double>(plan_.robots())};
     case Covariate::kRun: return {static_cast<double>(plan_.run_number()), static_cast<double>(plan_.run_number())};
-    case Covariate::kPlace: return {0, duration_s * plan_.robots() / plan_.tick_length.seconds()};
+    case Covariate::kPlace:
+      if (plan_.fields()[column.field].counts == ArenaFieldSettings::Counts::kTrail) return {0, 1};
+      return {0, duration_s * plan_.robots() / plan_.tick_length.seconds()};
     case Covariate::kPreviousForward:
     case Covariate::kPreviousSideways: return {-kFast_mm_s, kFast_mm_s};
     case Covariate::kPreviousTurn: return {-kFast_rad_s, kFast_rad_s};
@@ -208,7 +210,9 @@ void Covariates::fill(Column& column, Tick now, const RobotColumns& robots, std:
     case Covariate::kRun: return each([run = static_cast<double>(plan_.run_number())](std::size_t) { return run; });
     case Covariate::kPlace:
       KILOTWIN_DEMAND(fields != nullptr);
-      return each([&](std::size_t r) { return fields->value(column.field, robots.x_mm[r], robots.y_mm[r], now); });
+      return each([&](std::size_t r) {
+        return fields->value(column.field, robots.robot[r], robots.x_mm[r], robots.y_mm[r], now);
+      });
     case Covariate::kNeighbours:
     case Covariate::kNearest:
     case Covariate::kDensity:

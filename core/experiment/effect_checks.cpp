@@ -89,6 +89,8 @@ class EffectCheck {
            fmt::format("cell_mm is {}, which cuts the arena into {:.3g} cells; make them so large that there are "
                        "at most {:.0f}",
                        number_text(field.cell_mm()), cells, kMostCells));
+    demand(field.counts() != proto::ArenaField::TRAIL || field.forget_s() > 0, path + ".forget_s",
+           "forget_s is 0; a field that counts TRAIL needs the time in which a trail fades, e.g. forget_s: 10");
   }
 
   void check_effect(const Effect& effect, const std::string& path) {

@@ -124,6 +124,8 @@ constexpr FieldRule kRules[] = {
     {"Episodes.longest_s", 0, kLongest_s, "s", Lower::kExcluded},
     {"ArenaField.cell_mm", 10, kLongest_mm, "mm"},
     {"ArenaField.forget_s", 0, kLongest_s, "s"},
+    {"ArenaField.corner_x_mm", -kLongest_mm, kLongest_mm, "mm"},
+    {"ArenaField.corner_y_mm", -kLongest_mm, kLongest_mm, "mm"},
 
     {"Physics.sub_steps", 1, 4, ""},
     {"Physics.tilt_deg", 0, 45, "degrees"},

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -124,10 +125,11 @@ struct EffectSettings {
 };
 
 struct ArenaFieldSettings {
-  enum class Counts : std::uint8_t { kDrivenTime, kPresentTime, kVisits };
+  enum class Counts : std::uint8_t { kDrivenTime, kPresentTime, kVisits, kTrail };
   std::string name;
   Counts counts = Counts::kDrivenTime;
   double cell_mm = 0, forget_s = 0;
+  std::optional<double> corner_x_mm = {}, corner_y_mm = {};
 };
 
 }  // namespace kilotwin

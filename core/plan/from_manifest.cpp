@@ -300,12 +300,15 @@ BatterySettings battery_of(const proto::Battery& battery) {
 }
 
 ArenaFieldSettings field_of(const proto::ArenaField& field) {
-  ArenaFieldSettings out{field.name(), {}, field.cell_mm(), field.forget_s()};
+  ArenaFieldSettings out{field.name(), {}, field.cell_mm(), field.forget_s(), {}, {}};
   switch (field.counts()) {
     case proto::ArenaField::DRIVEN_TIME: out.counts = ArenaFieldSettings::Counts::kDrivenTime; break;
     case proto::ArenaField::PRESENT_TIME: out.counts = ArenaFieldSettings::Counts::kPresentTime; break;
     case proto::ArenaField::VISITS: out.counts = ArenaFieldSettings::Counts::kVisits; break;
+    case proto::ArenaField::TRAIL: out.counts = ArenaFieldSettings::Counts::kTrail; break;
   }
+  if (field.has_corner_x_mm()) out.corner_x_mm = field.corner_x_mm();
+  if (field.has_corner_y_mm()) out.corner_y_mm = field.corner_y_mm();
   return out;
 }
 

@@ -49,6 +49,19 @@ double upper_wall(std::vector<Place> places, double noise_mm, Evidence fewest) {
   return sum / static_cast<double>(at_edge);
 }
 
+/// A side that no robot reached. The arena's centre is the origin if the sides of the other pair are symmetric about it; then the
+/// side is as far from it as the opposite one. Infinite without that, or if robots were beyond.
+double mirrored(double opposite_mm, double low_mm, double high_mm, const std::vector<Place>& towards) {
+  constexpr double kNone = std::numeric_limits<double>::infinity(), kSymmetric = 0.005, kBeyond_mm = 4;
+  const bool centred = std::abs(low_mm + high_mm) < kSymmetric * (high_mm - low_mm);
+  if (!std::isfinite(low_mm) || !std::isfinite(high_mm) || !std::isfinite(opposite_mm) || !centred) return kNone;
+  const double side_mm = std::abs(opposite_mm);
+  const auto beyond =
+      std::count_if(towards.begin(), towards.end(), [&](const Place& p) { return p.at_mm > side_mm + kBeyond_mm; });
+  // Outliers may lie beyond the wall.
+  return static_cast<std::size_t>(beyond) > std::max<std::size_t>(3, towards.size() / 2000) ? kNone : side_mm;
+}
+
 }  // namespace
 
 Walls detected_walls(const PreparedSet& set, const MotionModel& model) {
@@ -88,7 +101,13 @@ Walls detected_walls(const PreparedSet& set, const MotionModel& model) {
   const std::array<double, 4> sides = {walls.x_low_mm, walls.x_high_mm, walls.y_low_mm, walls.y_high_mm};
   const bool closed =
       std::count_if(sides.begin(), sides.end(), [](double s) { return std::isfinite(s); }) >= kMostSides;
-  return closed ? seen({8, 1}) : walls;
+  if (!closed) return walls;
+  Walls all = seen({8, 1});
+  if (!std::isfinite(all.x_low_mm)) all.x_low_mm = -mirrored(all.x_high_mm, all.y_low_mm, all.y_high_mm, x_turned);
+  if (!std::isfinite(all.x_high_mm)) all.x_high_mm = mirrored(all.x_low_mm, all.y_low_mm, all.y_high_mm, x);
+  if (!std::isfinite(all.y_low_mm)) all.y_low_mm = -mirrored(all.y_high_mm, all.x_low_mm, all.x_high_mm, y_turned);
+  if (!std::isfinite(all.y_high_mm)) all.y_high_mm = mirrored(all.y_low_mm, all.x_low_mm, all.x_high_mm, y);
+  return all;
 }
 
 }  // namespace kilotwin::identify

@@ -5,7 +5,8 @@
 
 namespace kilotwin::identify {
 
-/// A side has a wall if driven robots accumulate at a line, some of them for seconds, and none is beyond it.
+/// A side has a wall if driven robots accumulate at a line, some of them for seconds, and none is beyond it. If three sides have
+/// one, the fourth may have been reached by none: in an arena about the origin it mirrors the opposite one.
 [[nodiscard]] Walls detected_walls(const PreparedSet&, const MotionModel&);
 
 }  // namespace kilotwin::identify

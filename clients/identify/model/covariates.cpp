@@ -70,7 +70,7 @@ double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
     case Covariate::kSinceRest: return s.commands.since_rest_s;
     case Covariate::kMotorTimeDifference: return s.commands.motor_s[1] - s.commands.motor_s[0];
     case Covariate::kLastTurn: return static_cast<double>(s.commands.last_turn);
-    case Covariate::kTraffic: return s.near.traffic_s[axis.radius];
+    case Covariate::kTraffic: return s.near.traffic[axis.radius];
     case Covariate::kRobot: return s.robot;
     case Covariate::kRun: return s.run;
   }

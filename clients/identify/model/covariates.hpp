@@ -14,8 +14,10 @@ namespace kilotwin::identify {
 inline constexpr std::array<double, 14> kNeighbourRadii_mm = {40,  50,  60,  70,  80,  90,  100,
                                                               110, 120, 130, 140, 150, 175, 200};
 
-/// Number of grids of driven time per floor cell, each with its own cell size (MotionModel::cells).
-inline constexpr std::size_t kTrafficGrids = 10;
+/// Number of traffic grids, each with its own cell size (MotionModel::cells).
+inline constexpr std::size_t kTrafficGrids = 12;
+/// The last ones hold trails of other robots; the others hold driven time.
+inline constexpr std::size_t kFirstTrailGrid = 10;
 
 /// One neighbour, relative to a robot.
 struct OtherRobot {
@@ -32,8 +34,8 @@ struct NeighbourView {
   std::array<float, kNeighbourRadii_mm.size()> count = {};  ///< number within each of kNeighbourRadii_mm
   /// sum of (1 - (distance / radius)^2)^2 for each of kNeighbourRadii_mm
   std::array<float, kNeighbourRadii_mm.size()> density = {};
-  /// driven time of all robots, itself included, in its cell of each grid, s
-  std::array<float, kTrafficGrids> traffic_s = {};
+  /// in its cell of each grid: driven time of all robots, itself included, s; or freshness of the trail of another one, 0..1
+  std::array<float, kTrafficGrids> traffic = {};
   /// Neighbours within kListed_mm: `listed` entries of this list from `first_listed` on. Null: not listed.
   const std::vector<OtherRobot>* list = nullptr;
   std::uint32_t first_listed = 0, listed = 0;
@@ -72,7 +74,7 @@ enum class Covariate : std::uint8_t {
   kLastTurn,
   kSinceRest,            ///< time since the last rest, s
   kMotorTimeDifference,  ///< motor-on time of the right wheel's motor minus that of the left one's, s
-  kTraffic,              ///< driven time of all robots in the floor cell, s
+  kTraffic,              ///< of the floor cell, as NeighbourView::traffic
   kRobot,
   kRun,
 };

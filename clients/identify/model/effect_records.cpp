@@ -69,7 +69,7 @@ Situation with(const Axis& axis, double value, Situation s = {}) {
       break;
     case Covariate::kNearest: s.near.nearest_mm = value; break;
     case Covariate::kDensity: s.near.density[axis.radius] = static_cast<float>(value); break;
-    case Covariate::kTraffic: s.near.traffic_s[axis.radius] = static_cast<float>(value); break;
+    case Covariate::kTraffic: s.near.traffic[axis.radius] = static_cast<float>(value); break;
     case Covariate::kBearing:
       s.near.nearest_mm = 0;
       s.near.direction_rad = value;
@@ -180,7 +180,9 @@ Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) 
         function.mutable_exponential()->set_scale(factor.points[0]);
       } else {
         const double slowest = *std::max_element(factor.points.begin(), factor.points.end());
-        set_spline(function, factor, coefficients, 0, 6 * slowest, factor.points.front(), 60);
+        // Of traffic only trails level off, and their freshness ends at 1.
+        const double end = factor.axis.of == Covariate::kTraffic ? 1 : 6 * slowest;
+        set_spline(function, factor, coefficients, 0, end, factor.points.front(), 60);
       }
       break;
     }
@@ -357,7 +359,9 @@ Effect turned_position(const Effect& turn, Target axis) {
 
 }  // namespace
 
-std::string field_name(std::uint8_t cells) { return fmt::format("traffic-{}", cells); }
+std::string field_name(std::uint8_t cells) {
+  return fmt::format("{}{}", cells >= kFirstTrailGrid ? kTrailField : "traffic-", cells);
+}
 
 double rounded(double value) {
   if (!std::isfinite(value)) return 0;

@@ -18,7 +18,8 @@ namespace kilotwin::identify {
 /// "product".
 [[nodiscard]] const char* form_of(const Term&);
 
-/// Name of the arena field that holds the driven time per cell of MotionModel::cells[cells].
+/// Name of the arena field of MotionModel::cells[cells]. Those of trails start with kTrailField.
+inline constexpr const char* kTrailField = "trail-";
 [[nodiscard]] std::string field_name(std::uint8_t cells);
 
 /// A number rounded to seven significant digits. 0 if not finite.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <optional>
 
+#include "clients/identify/model/effect_records.hpp"
 #include "core/effects/function.hpp"
 #include "core/plan/from_manifest.hpp"
 
@@ -59,6 +60,11 @@ Unit unit_of(Function::Covariate of) {
   }
 }
 
+/// Fields of trails have the name of their kind (model_file.cpp).
+bool is_trail(const Function& f) { return f.of() == Function::PLACE && f.field().rfind(kTrailField, 0) == 0; }
+
+Unit unit_of(const Function& f) { return is_trail(f) ? Unit{"%", 100} : unit_of(f.of()); }
+
 const char* name_of(Function::Covariate of) {
   switch (of) {
     case Function::TIME: return "time";
@@ -82,6 +88,10 @@ const char* name_of(Function::Covariate of) {
   }
 }
 
+const char* name_of(const Function& f) {
+  return is_trail(f) ? "freshness of another robot's trail" : name_of(f.of());
+}
+
 /// A signed value with three digits.
 std::string signed_size(double value, Effect::Target target) {
   const Unit unit = unit_of(target);
@@ -97,6 +107,10 @@ std::string place(double at, Function::Covariate of) {
   return *unit.name == 0 ? number : number + " " + unit.name;
 }
 
+std::string place(double at, const Function& f) {
+  return is_trail(f) ? fmt::format("{:.0f} % freshness", 100 * at) : place(at, f.of());
+}
+
 const char* command_name(double key) {
   constexpr const char* kNames[] = {"at rest", "straight", "left", "right"};
   return kNames[static_cast<std::size_t>(std::clamp(key, 0.0, 3.0))];
@@ -104,7 +118,7 @@ const char* command_name(double key) {
 
 /// The ends of a curve, and extremes between them.
 std::string of_curve(const std::vector<double>& at, const std::vector<double>& value, Effect::Target target,
-                     Function::Covariate of) {
+                     const Function& f) {
   const auto [low, high] = std::minmax_element(value.begin(), value.end());
   const double range = *high - *low;
   std::vector<std::size_t> places{0};
@@ -115,7 +129,7 @@ std::string of_curve(const std::vector<double>& at, const std::vector<double>& v
   std::sort(places.begin(), places.end());
   std::vector<std::string> parts;
   for (const std::size_t i : places)
-    parts.push_back(fmt::format("{} at {}", signed_size(value[i], target), place(at[i], of)));
+    parts.push_back(fmt::format("{} at {}", signed_size(value[i], target), place(at[i], f)));
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
@@ -144,14 +158,14 @@ std::string of_function(const Function& f, Effect::Target target) {
     case Function::kConstant: return signed_size(f.constant(), target);
     case Function::kSpline:
       return of_curve({f.spline().knot().begin(), f.spline().knot().end()},
-                      {f.spline().value().begin(), f.spline().value().end()}, target, f.of());
+                      {f.spline().value().begin(), f.spline().value().end()}, target, f);
     case Function::kSpline2D: {
       const auto [low, high] = std::minmax_element(f.spline_2d().value().begin(), f.spline_2d().value().end());
       return fmt::format("between {} and {} over the arena", signed_size(*low, target), signed_size(*high, target));
     }
     case Function::kExponential:
       return fmt::format("{} initially, decaying within {}", signed_size(f.exponential().at_zero(), target),
-                         place(f.exponential().scale(), f.of()));
+                         place(f.exponential().scale(), f));
     case Function::kHarmonic: {
       const double size = std::hypot(f.harmonic().cosine(), f.harmonic().sine());
       const double most =
@@ -163,8 +177,8 @@ std::string of_function(const Function& f, Effect::Target target) {
     case Function::kSteps: {
       std::vector<std::string> parts;
       for (int i = 0; i < std::min(f.steps().at_size(), 3); ++i)
-        parts.push_back(fmt::format("{} from {} on", signed_size(f.steps().value(i + 1), target),
-                                    place(f.steps().at(i), f.of())));
+        parts.push_back(
+            fmt::format("{} from {} on", signed_size(f.steps().value(i + 1), target), place(f.steps().at(i), f)));
       return fmt::format("{}", fmt::join(parts, ", "));
     }
     case Function::kTable: return of_table(f.table(), target, f.of());
@@ -371,10 +385,10 @@ nlohmann::json curves_of(const std::string& name, const std::vector<Effect>& eff
     if (effect.function_size() != 1 || !(effect.function(0).has_spline() || effect.function(0).has_steps()))
       continue;
     const Function& f = effect.function(0);
-    const Unit unit = unit_of(f.of()), acting = unit_of(effect.acts_on());
+    const Unit unit = unit_of(f), acting = unit_of(effect.acts_on());
     nlohmann::json curve = {{"name", name},
                             {"which", which_of(effect)},
-                            {"covariate", name_of(f.of())},
+                            {"covariate", name_of(f)},
                             {"unit", unit.name},
                             {"acts_on", Effect::Target_Name(effect.acts_on())},
                             {"acts_on_unit", acting.name},

@@ -65,8 +65,10 @@ proto::Model proto_of(const MotionModel& fitted) {
     if (!fitted.looks_at({Covariate::kTraffic, c})) continue;
     proto::ArenaField& field = *model.add_field();
     field.set_name(field_name(c));
-    field.set_counts(proto::ArenaField::DRIVEN_TIME);
+    field.set_counts(fitted.cells[c].trail ? proto::ArenaField::TRAIL : proto::ArenaField::DRIVEN_TIME);
     field.set_cell_mm(rounded(fitted.cells[c].side_mm));
+    field.set_corner_x_mm(rounded(fitted.cells[c].x_mm));
+    field.set_corner_y_mm(rounded(fitted.cells[c].y_mm));
     if (fitted.cells[c].forget_s > 0) field.set_forget_s(rounded(fitted.cells[c].forget_s));
   }
   std::set<std::string> names;

@@ -114,9 +114,19 @@ struct MotionModel {
   bool walls_uncertain = false;
   /// Robots with estimated centres this close may be in contact, mm.
   double contact_range_mm = kContactRange_mm;
-  /// Grids of driven time per floor cell. Those of the second row forget: fresh trails.
-  std::array<GridCells, kTrafficGrids> cells = {
-      GridCells{20}, {28}, {39}, {55}, {78}, {110}, {30, 0, 0, 10}, {50, 0, 0, 10}, {30, 0, 0, 40}, {50, 0, 0, 40}};
+  /// Traffic grids: driven time without and with decay, and trails of other robots.
+  std::array<GridCells, kTrafficGrids> cells = {GridCells{20},
+                                                {28},
+                                                {39},
+                                                {55},
+                                                {78},
+                                                {110},
+                                                {30, 0, 0, 10},
+                                                {50, 0, 0, 10},
+                                                {30, 0, 0, 40},
+                                                {50, 0, 0, 40},
+                                                {30, 0, 0, 10, true},
+                                                {50, 0, 0, 10, true}};
   std::vector<Term> terms;
   std::map<std::uint32_t, RobotBias> robots;
 

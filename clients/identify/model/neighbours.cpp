@@ -96,12 +96,11 @@ void RunNeighbours::update_traffic(const Run& run, const std::array<GridCells, k
     for (std::size_t i = 0; i < instants(); ++i) {
       for (std::size_t r = 0; r < run.tracks.size(); ++r) {
         const Spot& s = spot(r, i);
-        if (!std::isnan(s.x_mm))
-          views_[r * instants_ + i].traffic_s[c] = traffic.value_s(s.x_mm, s.y_mm, time_s(i));
+        if (!std::isnan(s.x_mm)) views_[r * instants_ + i].traffic[c] = traffic.value(r, s.x_mm, s.y_mm, time_s(i));
       }
       for (std::size_t r = 0; r < run.tracks.size(); ++r) {
         const Spot& s = spot(r, i);
-        if (!std::isnan(s.x_mm) && s.driven) traffic.add(s.x_mm, s.y_mm, kRaster_s, time_s(i));
+        if (!std::isnan(s.x_mm) && s.driven) traffic.add(r, s.x_mm, s.y_mm, kRaster_s, time_s(i));
       }
     }
   }

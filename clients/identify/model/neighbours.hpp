@@ -30,7 +30,7 @@ class RunNeighbours {
   /// From measured positions, or from estimated disc centres by track.
   explicit RunNeighbours(const Run&, const std::vector<Centres>* centres = nullptr);
   [[nodiscard]] const NeighbourView& view(std::size_t track, double time_s) const;
-  /// Computes the driven time per floor cell for these grids.
+  /// Computes the traffic for these grids.
   void update_traffic(const Run&, const std::array<GridCells, kTrafficGrids>& cells);
 
   /// Disc centre of a robot at one instant of the raster, mm.

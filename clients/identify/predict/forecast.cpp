@@ -158,11 +158,11 @@ class JointForecast {
       if (grids_.any()) robots_[r].needs_rollout = true;
       if (!robots_[r].needs_rollout)
         robots_[r].needs_rollout = edges_.near(x_[r], y_[r], std::clamp(uncertain, 6.0, 30.0));
-      grids_.see(x_[r], y_[r], now_s_, robots_[r].near);
+      grids_.see(robots_[r].view->place, x_[r], y_[r], now_s_, robots_[r].near);
     }
     for (std::size_t r = 0; grids_.any() && r < robots_.size(); ++r)
       if (!std::isnan(x_[r]) && robots_[r].view->clock->at(now_s_).driven())
-        grids_.add(x_[r], y_[r], for_s, now_s_);
+        grids_.add(robots_[r].view->place, x_[r], y_[r], for_s, now_s_);
   }
   void locate() {
     x_.assign(robots_.size(), std::nan(""));
@@ -223,7 +223,7 @@ class TrafficRecord {
       const auto [near, place] = of(banks[f]);
       for (std::size_t& i = next_[f]; i < near->instants() && is_before(near->time_s(i), banks[f].last_s(), now_s);
            ++i)
-        add(near->spot(place, i), near->time_s(i), known_);
+        add(place, near->spot(place, i), near->time_s(i), known_);
     }
     TrafficGrids now = known_;
     // From their last samples on, robots count as standing there.
@@ -233,7 +233,7 @@ class TrafficRecord {
       RunNeighbours::Spot last = near->spot(place, next_[f] - 1);
       for (std::size_t i = next_[f]; i < near->instants() && near->time_s(i) < now_s - 1e-6; ++i) {
         last.driven = banks[f].view().clock->at(near->time_s(i) + 1e-9).driven();
-        add(last, near->time_s(i), now);
+        add(place, last, near->time_s(i), now);
       }
     }
     return now;
@@ -246,8 +246,9 @@ class TrafficRecord {
   static bool is_before(double time_s, double seen_s, double now_s) {
     return time_s <= seen_s + 1e-6 && time_s < now_s - 1e-6;
   }
-  static void add(const RunNeighbours::Spot& spot, double time_s, TrafficGrids& to) {
-    if (!std::isnan(spot.x_mm) && spot.driven) to.add(spot.x_mm, spot.y_mm, RunNeighbours::kRaster_s, time_s);
+  static void add(std::size_t robot, const RunNeighbours::Spot& spot, double time_s, TrafficGrids& to) {
+    if (!std::isnan(spot.x_mm) && spot.driven)
+      to.add(robot, spot.x_mm, spot.y_mm, RunNeighbours::kRaster_s, time_s);
   }
   TrafficGrids known_;
   std::vector<std::size_t> next_;  ///< first instant that is not added yet

@@ -80,10 +80,11 @@ std::vector<RolloutMoments> rollouts(const MotionModel& model, const std::vector
       list.clear();
       for (std::size_t r = 0; r < robots.size(); ++r) {
         nears[r] = neighbours ? view_of(r, x, y, &list) : NeighbourView{};
-        grids.see(x[r], y[r], now_s, nears[r]);
+        grids.see(robots[r].view->place, x[r], y[r], now_s, nears[r]);
       }
       for (std::size_t r = 0; grids.any() && r < robots.size(); ++r)
-        if (robots[r].view->clock->at(now_s).driven()) grids.add(x[r], y[r], next_s - now_s, now_s);
+        if (robots[r].view->clock->at(now_s).driven())
+          grids.add(robots[r].view->place, x[r], y[r], next_s - now_s, now_s);
       for (std::uint32_t r = 0; r < robots.size(); ++r) {
         const NeighbourView& near = nears[r];
         const double start_s = step == 1 ? robots[r].now_s : now_s;

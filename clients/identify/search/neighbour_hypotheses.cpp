@@ -46,7 +46,9 @@ void add_neighbour_hypotheses(DictionaryBuilder& make, const Extent& extent) {
 
 void add_traffic_hypotheses(DictionaryBuilder& make) {
   for (std::uint8_t cells = 0; cells < kTrafficGrids; ++cells) {
-    Factor f = keyed(Shape::kExponential, Covariate::kTraffic, {2, 8, 32});
+    // Without a trail there is no effect.
+    Factor f = MotionModel{}.cells[cells].trail ? keyed(Shape::kLevelling, Covariate::kTraffic, {0.1, 0.4, 2})
+                                                : keyed(Shape::kExponential, Covariate::kTraffic, {2, 8, 32});
     f.axis.radius = cells;
     const auto bases = make.put(kSpeed, Basis{{f}});
     make.add(kSpeed, "traffic", {"history", "position"}, some(bases, 0, 3), kTrafficGrids);

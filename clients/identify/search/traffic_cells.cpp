@@ -10,28 +10,34 @@
 namespace kilotwin::identify {
 namespace {
 
-/// Classes of driven time per cell, with increasing width.
+/// Classes of driven time per cell, with increasing width, or of the freshness of a trail.
 class Classes {
  public:
   static constexpr std::size_t kCount = 16;
-  Classes() {
+  explicit Classes(bool trail)
+      : per_value_(trail ? 1.0F * (kOf - 1) : static_cast<float>(1 / RunNeighbours::kRaster_s)) {
     for (std::size_t i = 0; i < of_.size(); ++i) {
       const double time_s = static_cast<double>(i) * RunNeighbours::kRaster_s;
-      of_[i] = static_cast<std::uint8_t>(std::min(2.4 * std::log2(1 + 2 * time_s), kCount - 1.0));
+      // 0 is a class of its own: no trail.
+      const double of_trail = i == 0 ? 0 : 1 + (kCount - 1.0) * static_cast<double>(i) / kOf;
+      of_[i] =
+          static_cast<std::uint8_t>(trail ? of_trail : std::min(2.4 * std::log2(1 + 2 * time_s), kCount - 1.0));
     }
   }
-  [[nodiscard]] std::size_t of(float time_s) const {
-    const float i = time_s * static_cast<float>(1 / RunNeighbours::kRaster_s) + 0.5F;
-    return of_[std::min(static_cast<std::size_t>(i), of_.size() - 1)];
+  [[nodiscard]] std::size_t of(float value) const {
+    return of_[std::min(static_cast<std::size_t>(value * per_value_ + 0.5F), of_.size() - 1)];
   }
 
  private:
-  std::array<std::uint8_t, 512> of_;
+  static constexpr std::size_t kOf = 512;
+  float per_value_;
+  std::array<std::uint8_t, kOf> of_;
 };
 
 /// Half the sum of squares that a speed per class explains.
 double explained(const Visits& visits, const GridCells& cells) {
-  static const Classes classes;
+  static const Classes of_times(false), of_trails(true);
+  const Classes& classes = cells.trail ? of_trails : of_times;
   std::array<double, Classes::kCount> score{}, information{};
   for (const std::vector<Instant>& run : visits.runs) {
     TrafficGrid traffic(cells);
@@ -40,12 +46,12 @@ double explained(const Visits& visits, const GridCells& cells) {
       now_s += visits.every_s;
       for (const Visit& v : instant) {
         if (v.information == 0) continue;
-        const std::size_t c = classes.of(traffic.value_s(v.x_mm, v.y_mm, now_s));
+        const std::size_t c = classes.of(traffic.value(v.robot, v.x_mm, v.y_mm, now_s));
         score[c] += v.score;
         information[c] += v.information;
       }
       for (const Visit& v : instant)
-        if (v.driven) traffic.add(v.x_mm, v.y_mm, visits.every_s, now_s);
+        if (v.driven) traffic.add(v.robot, v.x_mm, v.y_mm, visits.every_s, now_s);
     }
   }
   double sum = 0;
@@ -77,7 +83,7 @@ RatedCells climbed(const Visits& visits, RatedCells best, double extent_mm) {
         for (const double sign : {1.0, -1.0}) {
           RatedCells trial;
           trial.cells = {best.cells.side_mm + sign * by_side, best.cells.x_mm + sign * by_x,
-                         best.cells.y_mm + sign * by_y, best.cells.forget_s + sign * by_forget};
+                         best.cells.y_mm + sign * by_y, best.cells.forget_s + sign * by_forget, best.cells.trail};
           trial.value = explained(visits, trial.cells);
           if (trial.value <= best.value) continue;
           best = trial;
@@ -113,7 +119,7 @@ GridCells fit_grid_cells(const Fitter& fitter, const FitState& state, const Grid
   for (double side = kSmallest_mm; side < kLargest_mm; side *= 1 + 0.3 * side / extent_mm)
     for (int i = 0; i < kCorners; ++i)
       for (int j = 0; j < kCorners; ++j)
-        all.push_back({{side, side * i / kCorners, side * j / kCorners, from.forget_s}, 0});
+        all.push_back({{side, side * i / kCorners, side * j / kCorners, from.forget_s, from.trail}, 0});
   os::in_parallel(all.size(), fitter.threads(),
                   [&](std::size_t i) { all[i].value = explained(visits, all[i].cells); });
   std::stable_sort(all.begin(), all.end(),

@@ -1,6 +1,7 @@
 /// Where robots were, and by how much their speed deviated there from the model.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "clients/identify/fit/fitter.hpp"
@@ -9,6 +10,7 @@ namespace kilotwin::identify {
 
 /// A robot at an instant: position and speed residual.
 struct Visit {
+  std::uint32_t robot;  ///< place of its track in the run
   float x_mm, y_mm;
   float score, information;
   bool driven;

@@ -2,6 +2,8 @@
 // traffic cells.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 
@@ -24,7 +26,7 @@ const GridCells kCells{43, 15, -12};
 struct Around {
   std::size_t robot;
   const std::vector<double>&x_mm, &y_mm;  ///< of all robots
-  double traffic_s;                       ///< driven time in its cell
+  double traffic;                         ///< driven time in its cell, s, or freshness of a trail
   double heading_rad;
 };
 using Gain = std::function<double(const Around&)>;
@@ -77,7 +79,7 @@ MeasuredSet played(const Gain& gain, std::uint64_t seed, std::uint32_t robots, d
         track.commands.push_back({t, straight ? Motion::kStraight : draw < 0.5 ? Motion::kLeft : Motion::kRight});
         next_s[r] = t + (straight ? 3 + 6 * draw : 1 + 2 * draw);
       }
-      const double speed = gain({r, disc_x, disc_y, traffic.value_s(disc_x[r], disc_y[r]), heading[r]});
+      const double speed = gain({r, disc_x, disc_y, traffic.value(r, disc_x[r], disc_y[r], t), heading[r]});
       const Eigen::Vector2d v = speed * nominal_speeds(BaseParameters{}, track.commands.back().motion);
       const double sd = std::sqrt(factor_s / dt);
       Rates rates;
@@ -88,7 +90,7 @@ MeasuredSet played(const Gain& gain, std::uint64_t seed, std::uint32_t robots, d
       y[r] += arc.dy_mm;
       heading[r] += arc.dheading_rad;
     }
-    for (std::uint32_t r = 0; r < robots; ++r) traffic.add(disc_x[r], disc_y[r], dt);
+    for (std::uint32_t r = 0; r < robots; ++r) traffic.add(r, disc_x[r], disc_y[r], dt, t);
   }
   return set;
 }
@@ -238,19 +240,38 @@ TEST(Place, TheDirectionOfNeighboursIsRecovered) {
 
 TEST(Place, TrafficCountsPerCell) {
   TrafficGrid traffic({30, 0, 0});
-  traffic.add(31, -1, 2);
-  traffic.add(59, -29, 0.5);
-  EXPECT_FLOAT_EQ(traffic.value_s(45, -15), 2.5F);
-  EXPECT_FLOAT_EQ(traffic.value_s(29, -15), 0);
-  EXPECT_FLOAT_EQ(traffic.value_s(45, 1), 0);
+  traffic.add(0, 31, -1, 2);
+  traffic.add(0, 59, -29, 0.5);
+  EXPECT_FLOAT_EQ(traffic.value(0, 45, -15), 2.5F);
+  EXPECT_FLOAT_EQ(traffic.value(0, 29, -15), 0);
+  EXPECT_FLOAT_EQ(traffic.value(0, 45, 1), 0);
   // Positions far outside share one cell.
-  traffic.add(1e6, 1e6, 1);
-  EXPECT_FLOAT_EQ(traffic.value_s(2e6, 3e6), 1);
+  traffic.add(0, 1e6, 1e6, 1);
+  EXPECT_FLOAT_EQ(traffic.value(0, 2e6, 3e6), 1);
   // Another corner.
   TrafficGrid moved({30, 10, -5});
-  moved.add(11, -4, 1);
-  EXPECT_FLOAT_EQ(moved.value_s(39, 24), 1);
-  EXPECT_FLOAT_EQ(moved.value_s(9, 24), 0);
+  moved.add(0, 11, -4, 1);
+  EXPECT_FLOAT_EQ(moved.value(0, 39, 24), 1);
+  EXPECT_FLOAT_EQ(moved.value(0, 9, 24), 0);
+}
+
+TEST(Place, TrailsAreThoseOfOthersInAnyOrder) {
+  // Robots 1, 2 and 3 passed at 2, 5 and 3 s.
+  const std::array<std::pair<std::size_t, double>, 4> passages = {{{1, 2}, {2, 5}, {3, 3}, {2, 1}}};
+  std::array<std::size_t, 4> order = {0, 1, 2, 3};
+  do {
+    TrafficGrid trails({30, 0, 0, 10, true});
+    for (const std::size_t i : order) trails.add(passages[i].first, 5, 5, 0.25, passages[i].second);
+    EXPECT_NEAR(trails.value(1, 5, 5, 8), std::exp(-0.3), 1e-6);
+    EXPECT_NEAR(trails.value(2, 5, 5, 8), std::exp(-0.5), 1e-6);
+    EXPECT_NEAR(trails.value(3, 5, 5, 8), std::exp(-0.3), 1e-6);
+    EXPECT_EQ(trails.value(1, 35, 5, 8), 0);
+  } while (std::next_permutation(order.begin(), order.end()));
+  // Nobody meets a trail of its own.
+  TrafficGrid alone({30, 0, 0, 10, true});
+  alone.add(1, 5, 5, 0.25, 0);
+  EXPECT_EQ(alone.value(1, 5, 5, 0), 0);
+  EXPECT_EQ(alone.value(2, 5, 5, 0), 1);
 }
 
 /// Distance between two corners modulo the cell size.
@@ -269,8 +290,7 @@ FitState remembering(const Fitter& fitter, const MeasuredSet& set, std::uint8_t 
 }
 
 TEST(Place, TrafficCellsAreRecovered) {
-  const MeasuredSet set =
-      played([](const Around& a) { return 1 - 0.5 * a.traffic_s / (a.traffic_s + 4); }, 8, 12, 150);
+  const MeasuredSet set = played([](const Around& a) { return 1 - 0.5 * a.traffic / (a.traffic + 4); }, 8, 12, 150);
   const Fitter fitter(set, 2);
   FitState state = remembering(fitter, set, 2);
   const MotionModel& model = state.model;
@@ -281,7 +301,7 @@ TEST(Place, TrafficCellsAreRecovered) {
   EXPECT_LT(off(cells.x_mm, kCells.x_mm, kCells.side_mm), 3);
   EXPECT_LT(off(cells.y_mm, kCells.y_mm, kCells.side_mm), 3);
   Situation fresh = driven_at(0, 0), worn = fresh;
-  worn.near.traffic_s[axis.radius] = 12;
+  worn.near.traffic[axis.radius] = 12;
   EXPECT_NEAR(gain_of(model, worn) / gain_of(model, fresh), 1 - 0.5 * 12 / 16, 0.05);
   // The written effect.
   const proto::Model written = proto_of(model);
@@ -295,9 +315,34 @@ TEST(Place, TrafficCellsAreRecovered) {
   }));
 }
 
+TEST(Place, TrailsOfOthersAreRecovered) {
+  const GridCells trails{37, 15, -12, 14, true};
+  const MeasuredSet set = played([](const Around& a) { return 1 - 0.5 * a.traffic; }, 9, 12, 150, trails);
+  const Fitter fitter(set, 2);
+  // From a grid of time in cells: the kind is found.
+  FitState state = remembering(fitter, set, 7);
+  const MotionModel& model = state.model;
+  ASSERT_TRUE(refine_traffic_shape(fitter, state, 0));
+  const Axis axis = model.terms[0].blocks.front().basis.factors.front().axis;
+  const GridCells& cells = model.cells[axis.radius];
+  ASSERT_TRUE(cells.trail);
+  EXPECT_NEAR(cells.side_mm, trails.side_mm, 0.7);
+  EXPECT_LT(off(cells.x_mm, trails.x_mm, trails.side_mm), 3);
+  EXPECT_LT(off(cells.y_mm, trails.y_mm, trails.side_mm), 3);
+  for (const double age_s : {1.0, 10.0, 20.0}) {
+    Situation none = driven_at(0, 0), behind = none;
+    behind.near.traffic[axis.radius] = static_cast<float>(std::exp(-age_s / cells.forget_s));
+    EXPECT_NEAR(gain_of(model, behind) / gain_of(model, none), 1 - 0.5 * std::exp(-age_s / 14), 0.05) << age_s;
+  }
+  const proto::Model written = proto_of(model);
+  ASSERT_EQ(written.field_size(), 1);
+  EXPECT_EQ(written.field(0).counts(), proto::ArenaField::TRAIL);
+  EXPECT_NEAR(written.field(0).corner_x_mm(), cells.x_mm, 1e-5);
+}
+
 TEST(Place, AStepInTrafficIsRecovered) {
   const GridCells small{24, 7, -9};
-  const MeasuredSet set = played([](const Around& a) { return a.traffic_s > 2 ? 0.7 : 1.0; }, 9, 12, 200, small);
+  const MeasuredSet set = played([](const Around& a) { return a.traffic > 2 ? 0.7 : 1.0; }, 9, 12, 200, small);
   const Fitter fitter(set, 2);
   FitState state = remembering(fitter, set, 0);
   const MotionModel& model = state.model;
@@ -309,7 +354,7 @@ TEST(Place, AStepInTrafficIsRecovered) {
   EXPECT_LT(off(cells.y_mm, small.y_mm, small.side_mm), 2);
   const auto gain_after = [&](double seconds) {
     Situation s = driven_at(0, 0);
-    s.near.traffic_s[axis.radius] = static_cast<float>(seconds);
+    s.near.traffic[axis.radius] = static_cast<float>(seconds);
     return gain_of(model, s);
   };
   for (const double seconds : {4.0, 10.0, 20.0}) EXPECT_NEAR(gain_after(seconds) / gain_after(0.25), 0.7, 0.06);

@@ -97,6 +97,7 @@ struct Scene {
   bool contacts = true;
 
   // Drive.
+  double straight_mm_s = 10, turn_mm_s = 20;  // speed of each wheel straight ahead, and of the outer one in a turn
   double wheel_base_mm = 25;
   double disc_ahead_mm = 9.2;     // disc centre ahead of the point between the wheels
   double tracked_ahead_mm = 9.2;  // tracked point ahead of it

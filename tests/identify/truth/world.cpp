@@ -28,14 +28,9 @@ Rate rate_of(const Scene& scene, double heading, Wheels<double> wheels, const Pu
 
 }  // namespace
 
-Wheels<double> nominal_mm_s(Motion motion) {
-  switch (motion) {
-    case Motion::kStop: return {0, 0};
-    case Motion::kStraight: return {10, 10};
-    case Motion::kLeft: return {0, 20};
-    case Motion::kRight: return {20, 0};
-  }
-  return {0, 0};
+Wheels<bool> driven(Motion motion) {
+  return {motion == Motion::kStraight || motion == Motion::kRight,
+          motion == Motion::kStraight || motion == Motion::kLeft};
 }
 
 Vec disc_of(const Scene& scene, const Stance& stance) {
@@ -65,7 +60,9 @@ Stance moved(const Scene& scene, const Individual& individual, const Stance& sta
   }
   Wheels<double> wheels;
   if (situation.driven()) {
-    const Wheels<double> nominal = nominal_mm_s(situation.motion);
+    const double speed_mm_s = situation.motion == Motion::kStraight ? scene.straight_mm_s : scene.turn_mm_s;
+    const Wheels<bool> on = driven(situation.motion);
+    const Wheels<double> nominal{on.left ? speed_mm_s : 0, on.right ? speed_mm_s : 0};
     wheels.left = factor.left * (nominal.left + individual.bias_mm_s.left) * push.gain.left + push.offset_mm_s.left;
     wheels.right =
         factor.right * (nominal.right + individual.bias_mm_s.right) * push.gain.right + push.offset_mm_s.right;
@@ -157,9 +154,8 @@ void Memory::go_to(double time_s, const std::vector<Vec>& discs) {
   for (std::size_t i = 0; i < robots_.size(); ++i) {
     Robot& robot = robots_[i];
     robot.since_s += dt;
-    const Wheels<double> nominal = nominal_mm_s(robot.motion);
-    if (nominal.left > 0) robot.driven_s.left += dt;
-    if (nominal.right > 0) robot.driven_s.right += dt;
+    if (driven(robot.motion).left) robot.driven_s.left += dt;
+    if (driven(robot.motion).right) robot.driven_s.right += dt;
     robot.since_rest_s = robot.motion == Motion::kStop ? 0 : robot.since_rest_s + dt;
     if (robot.motion == Motion::kStop) continue;
     const std::size_t at = spot(discs[i]);

@@ -16,8 +16,8 @@ struct Stance {
   double heading_rad = 0;
 };
 
-/// Commanded wheel speeds.
-Wheels<double> nominal_mm_s(Motion motion);
+/// Which wheels a command drives.
+Wheels<bool> driven(Motion motion);
 
 Vec disc_of(const Scene& scene, const Stance& stance);
 

@@ -34,7 +34,8 @@ std::string with(const std::string& covariate, const std::string& radius_mm = "8
 
 const std::string kFields =
     "field { name: 'driven' cell_mm: 45 } field { name: 'visits' counts: VISITS cell_mm: 70 forget_s: 3 } "
-    "field { name: 'present' counts: PRESENT_TIME cell_mm: 120 forget_s: 20 } ";
+    "field { name: 'present' counts: PRESENT_TIME cell_mm: 120 forget_s: 20 } "
+    "field { name: 'trail' counts: TRAIL cell_mm: 60 forget_s: 5 corner_x_mm: 7 } ";
 
 /// One effect per covariate, cycling through the targets, and one per shape.
 std::string everything() {
@@ -61,6 +62,7 @@ std::string everything() {
       "scale: 5 }");
   add("BODY_DRIFT", "of: PLACE field: 'visits' steps { at: [1, 2.5] value: [0, 1, -1] }");
   add("BODY_DRIFT direction_deg: 180", "of: PLACE field: 'present' spline { knot: [0, 1, 5] value: [0, 2, 0] }");
+  add("WHEEL_GAIN", "of: PLACE field: 'trail' linear { slope: -0.4 }");
   add("WHEEL_GAIN robot: [3, 4, 5, 60]", "of: ROBOT table { key: [3, 60] value: [0.3, -0.3] otherwise: 0.1 }");
   return text;
 }

@@ -394,6 +394,31 @@ TEST(Effects, ArenaFieldsAccumulate) {
   EXPECT_EQ(swarms[0].poses()[3].x_mm, -200);
 }
 
+TEST(Effects, TrailsAreThoseOfTheLatestOtherRobot) {
+  // Robots 0 and 1 share a cell and drive in turns; 2 reads the cell at rest. Nobody was in the cell of robot 3.
+  const RunPlan plan = make_plan(
+      "motion { noise: false straight_speed_mm_s: 0 } field { name: 'f' counts: TRAIL forget_s: 2 cell_mm: 100 "
+      "corner_x_mm: 995 corner_y_mm: -105 } "
+      "effect { name: 'e' acts_on: WORLD_DRIFT during: [STOP, STRAIGHT] function { " +
+          thousandth("PLACE", "field: 'f'") + " } }",
+      {{10, 10, kPi / 2}, {60, 10, 0}, {10, 60, 0}, {-200, 0, 0}});
+  Swarm swarm(plan);
+  const auto freshness = [](int age) { return std::exp(-age * kTick_s / 2); };
+  for (int k = 0; k < 60; ++k) {
+    swarm.set_motors(0, k < 20 ? 70 : 0, k < 20 ? 70 : 0);
+    swarm.set_motors(1, k >= 40 ? 70 : 0, k >= 40 ? 70 : 0);
+    const auto before = swarm.poses();
+    swarm.step();
+    const auto after = swarm.poses();
+    const auto read = [&](std::size_t r) { return 1000 * (after[r].x_mm - before[r].x_mm) / kTick_s; };
+    const int since_0 = k <= 20 ? 1 : k - 19, since_1 = 1;
+    EXPECT_NEAR(read(0), k <= 40 ? 0 : freshness(since_1), 1e-7) << k;
+    EXPECT_NEAR(read(1), k == 0 ? 0 : freshness(since_0), 1e-7) << k;
+    EXPECT_NEAR(read(2), k == 0 ? 0 : k <= 40 ? freshness(since_0) : freshness(since_1), 1e-7) << k;
+    EXPECT_NEAR(read(3), 0, 1e-7) << k;
+  }
+}
+
 TEST(Effects, ActDuringTheStatedCommandsOnTheStatedRobots) {
   const RunPlan plan =
       make_plan(kQuiet + effect("acts_on: WHEEL_GAIN during: LEFT robot: [1, 2, 77]", "constant: 1"),

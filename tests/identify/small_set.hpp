@@ -1,0 +1,41 @@
+/// Small scenes as measured sets, for tests of parts of the identification.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "clients/identify/data/measured_set.hpp"
+#include "tests/identify/truth/files.hpp"
+#include "tests/identify/truth/play.hpp"
+#include "tests/identify/truth/scenarios.hpp"
+
+namespace kilotwin {
+
+/// Ten robots, two runs of 120 s, in an arena of 700 mm.
+inline truth::Scene small(std::vector<truth::Effect> effects) {
+  truth::Scene scene = truth::scenario("nothing-tidy");
+  scene.robots = 10;
+  scene.train_runs = 2;
+  scene.train_s = 120;
+  scene.test_runs = 0;
+  scene.width_mm = scene.height_mm = 700;
+  scene.effects = std::move(effects);
+  return scene;
+}
+
+inline truth::Play played(const truth::Scene& scene, std::uint64_t seed = 5) { return truth::play(scene, seed); }
+
+inline identify::MeasuredSet set_of(const truth::Scene& scene, const truth::Play& play) {
+  const auto* const test = testing::UnitTest::GetInstance()->current_test_info();
+  const auto folder = std::filesystem::path(testing::TempDir()) / (std::string("general-") + test->name());
+  truth::write_data(scene, play.train, folder);
+  identify::MeasuredSet set = identify::load_measured_set(folder);
+  std::filesystem::remove_all(folder);
+  return set;
+}
+
+}  // namespace kilotwin
