@@ -120,6 +120,9 @@ class Verifier : public RunObserver {
   void tracker_sample(Tick, const TrackerSample& sample) override {
     if (monitor_ != nullptr) monitor_->tracker_sample(sample);
   }
+  void observed(const proto::Observations& observations) override {
+    if (monitor_ != nullptr) monitor_->observed(observations);
+  }
   void watch_with(RunMonitor& monitor) { monitor_ = &monitor; }
   void idle(const RunProgress& now) override { progress_.show(now); }
   void hash(Tick tick, std::uint64_t chain) override {

@@ -8,7 +8,9 @@
 #include "clients/monitor/report.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
+#include "core/observations/events.hpp"
 #include "core/os/files.hpp"
+#include "idl/recording.pb.h"
 
 namespace kilotwin::cli {
 
@@ -32,10 +34,16 @@ void add_monitor_options(CLI::App& app, MonitorOptions& options) {
                  "with --monitor: declared commands of tracked robots, a table of robot,time_s,motion")
       ->type_name("FILE")
       ->needs(on);
+  app.add_option("--station-commands", options.station_commands,
+                 "with --monitor: types of the station's messages to robots that command motions, such as "
+                 "1=left,2=right,3=stop,4=straight")
+      ->type_name("TYPE=MOTION,...")
+      ->needs(on);
 }
 
 void check_monitor_options(const MonitorOptions& options) {
   if (!options.commands.empty()) static_cast<void>(monitor::CommandTable(options.commands));
+  if (!options.station_commands.empty()) static_cast<void>(monitor::station_commands_of(options.station_commands));
 }
 
 std::vector<std::string> monitor_words(const MonitorOptions& options) {
@@ -45,13 +53,32 @@ std::vector<std::string> monitor_words(const MonitorOptions& options) {
                                  fmt::format("{}", options.settings.warm_up_s)};
   if (!options.commands.empty())
     words.insert(words.end(), {"--commands", std::filesystem::absolute(options.commands).string()});
+  if (!options.station_commands.empty())
+    words.insert(words.end(), {"--station-commands", options.station_commands});
   return words;
 }
 
+namespace {
+
+monitor::MonitorSettings monitor_settings(const RunPlan& plan, const MonitorOptions& options) {
+  monitor::MonitorSettings settings = options.settings;
+  if (options.station_commands.empty()) return settings;
+  if (!RecordedEvents(plan).station) {
+    throw UserError(
+        "--station-commands: the run does not record what the station sends; add event: STATION to the "
+        "experiment's "
+        "recording block");
+  }
+  settings.station_commands = monitor::station_commands_of(options.station_commands);
+  return settings;
+}
+
+}  // namespace
+
 RunMonitor::RunMonitor(const RunPlan& plan, const MonitorOptions& options, std::filesystem::path table)
-    : settings_(options.settings),
+    : settings_(monitor_settings(plan, options)),
       table_(std::move(table)),
-      monitor_(plan, options.settings,
+      monitor_(plan, settings_,
                options.commands.empty() ? monitor::CommandTable() : monitor::CommandTable(options.commands)),
       rows_(monitor::table_header() + "\n") {
   if (table_.empty()) return;
@@ -68,6 +95,10 @@ void RunMonitor::write_residuals() {
   if (fresh.empty() || !residuals_) return;
   for (const monitor::Residual& residual : fresh) residuals_->buffer() += monitor::residuals_row(residual) + "\n";
   residuals_->flush();
+}
+
+void RunMonitor::observed(const proto::Observations& observations) {
+  for (const proto::EventRecord& event : observations.event()) monitor_.take(event);
 }
 
 void RunMonitor::state(const SwarmView& swarm) {

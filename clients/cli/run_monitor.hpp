@@ -23,6 +23,7 @@ struct MonitorOptions {
   bool on = false;
   monitor::MonitorSettings settings;
   std::filesystem::path commands;  ///< declared commands; empty: none
+  std::string station_commands;    ///< what the station's messages command; empty: nothing
 };
 
 /// Adds --monitor and the options that go with it.
@@ -39,6 +40,7 @@ class RunMonitor {
   RunMonitor(const RunPlan& plan, const MonitorOptions& options, std::filesystem::path table);
 
   void tracker_sample(const TrackerSample& sample) { monitor_.take(sample); }
+  void observed(const proto::Observations& observations);
   /// Prints alarms as they come. Throws RunError if a table cannot be written.
   void state(const SwarmView& swarm);
   [[nodiscard]] const std::vector<monitor::Alarm>& alarms() const { return alarms_; }

@@ -147,6 +147,7 @@ void RunRecorder::tracker_sample(Tick tick, const TrackerSample& sample) {
 }
 
 void RunRecorder::observed(const proto::Observations& observations) {
+  if (monitor_) monitor_->observed(observations);
   for (const proto::VariableRecord& variable : observations.variable()) writer_.variable(variable);
   for (const proto::EventRecord& event : observations.event()) take_event(event);
 }

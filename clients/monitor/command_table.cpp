@@ -8,7 +8,6 @@
 #include "core/csv/csv_reader.hpp"
 
 namespace kilotwin::monitor {
-namespace {
 
 std::optional<MotionCommand> command_named(std::string_view name) {
   if (name == "stop") return MotionCommand::kStop;
@@ -17,8 +16,6 @@ std::optional<MotionCommand> command_named(std::string_view name) {
   if (name == "right") return MotionCommand::kTurnRight;
   return std::nullopt;
 }
-
-}  // namespace
 
 CommandTable::CommandTable(const std::filesystem::path& file) {
   CsvReader table(file);
@@ -52,6 +49,12 @@ void CommandTable::read(CsvReader& table) {
     std::stable_sort(changes.begin(), changes.end(),
                      [](const Change& a, const Change& b) { return a.time_s < b.time_s; });
   }
+}
+
+void CommandTable::add(std::uint32_t robot, double time_s, MotionCommand command) {
+  std::vector<Change>& changes = commands_[robot];
+  // Stations repeat themselves.
+  if (changes.empty() || changes.back().command != command) changes.push_back({time_s, command});
 }
 
 std::vector<std::uint32_t> CommandTable::robots() const {

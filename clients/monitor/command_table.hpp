@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/base/time.hpp"
@@ -17,6 +19,9 @@ class CsvReader;
 
 namespace kilotwin::monitor {
 
+/// stop, straight, left or right.
+[[nodiscard]] std::optional<MotionCommand> command_named(std::string_view name);
+
 class CommandTable {
  public:
   /// No commands.
@@ -27,6 +32,8 @@ class CommandTable {
   /// The same of a table in memory; `name` stands for the file in errors.
   CommandTable(std::string name, std::string content);
 
+  /// From that time on; times of a robot ascend.
+  void add(std::uint32_t robot, double time_s, MotionCommand command);
   /// Ascending ids of the robots that have commands.
   [[nodiscard]] std::vector<std::uint32_t> robots() const;
   [[nodiscard]] bool has(std::uint32_t robot) const { return commands_.contains(robot); }

@@ -10,6 +10,7 @@
 #include "core/plan/motion_settings.hpp"
 #include "core/plan/run_settings.hpp"
 #include "core/plan/tracking_settings.hpp"
+#include "idl/recording.pb.h"
 
 namespace kilotwin::monitor {
 namespace {
@@ -30,7 +31,17 @@ std::vector<std::uint32_t> tracked_robots(const RunPlan& plan) {
   return robots;
 }
 
-std::vector<std::uint32_t> watched_robots(const RunPlan& plan, const CommandTable& declared) {
+/// Robots whose commands nothing else tells.
+std::vector<bool> commanded_by_station(const RunPlan& plan, const MonitorSettings& settings,
+                                       const CommandTable& declared) {
+  std::vector<bool> robots(plan.robots(), false);
+  for (std::uint32_t robot = 0; robot < plan.robots() && !settings.station_commands.empty(); ++robot)
+    robots[robot] = plan.tracked(robot) && plan.program_of(robot) == kNoProgram && !declared.has(robot);
+  return robots;
+}
+
+std::vector<std::uint32_t> watched_robots(const RunPlan& plan, const CommandTable& declared,
+                                          const std::vector<bool>& by_station) {
   for (const std::uint32_t robot : declared.robots()) {
     if (robot >= plan.robots() || !plan.tracked(robot)) {
       throw UserError(
@@ -40,13 +51,14 @@ std::vector<std::uint32_t> watched_robots(const RunPlan& plan, const CommandTabl
     }
   }
   std::vector<std::uint32_t> robots = tracked_robots(plan);
-  std::erase_if(robots,
-                [&](std::uint32_t robot) { return plan.program_of(robot) == kNoProgram && !declared.has(robot); });
+  std::erase_if(robots, [&](std::uint32_t robot) {
+    return plan.program_of(robot) == kNoProgram && !declared.has(robot) && !by_station[robot];
+  });
   if (robots.empty()) {
     throw UserError(
         "--monitor: no tracked robot has known commands; give its group `says { shadow: true }` and a behaviour, "
         "or "
-        "declare the commands with --commands FILE");
+        "declare the commands with --commands FILE, or name the station's with --station-commands");
   }
   return robots;
 }
@@ -71,10 +83,11 @@ Monitor::Monitor(const RunPlan& plan, const MonitorSettings& settings, CommandTa
     : plan_(plan),
       settings_(settings),
       declared_(std::move(declared)),
+      commanded_by_station_(commanded_by_station(plan, settings, declared_)),
       parameters_(plan),
       motors_(plan),
       tracked_(tracked_robots(plan)),
-      watched_(watched_robots(plan, declared_)),
+      watched_(watched_robots(plan, declared_, commanded_by_station_)),
       motion_(plan, watched_),
       contacts_(plan, tracked_),
       places_(plan.world.arena.half_width_mm(), plan.world.arena.half_height_mm()),
@@ -104,6 +117,14 @@ Monitor::Monitor(const RunPlan& plan, const MonitorSettings& settings, CommandTa
   threshold_nat_ = threshold_nat(robots * (lasting + 1) + 2, static_cast<double>(coarse_.every()) * tick_s, rate);
   shift_threshold_nat_ =
       threshold_nat(robots * absorbed + trackers_, static_cast<double>(fine_.every()) * tick_s, rate);
+}
+
+void Monitor::take(const proto::EventRecord& packets) {
+  for (const SentCommand& sent : commands_in(packets, settings_.station_commands)) {
+    if (sent.robot >= plan_.robots() || !commanded_by_station_[sent.robot]) continue;
+    const double offset_s = static_cast<double>(sent.offset_cycles) / kNominalClockHz;
+    declared_.add(sent.robot, seconds(Tick{packets.tick()}) + offset_s, sent.command);
+  }
 }
 
 void Monitor::read_commands(const SwarmView& swarm) {

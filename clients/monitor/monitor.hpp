@@ -43,6 +43,8 @@ class Monitor {
 
   /// A sample that was stamped for the tick of the next state.
   void take(const TrackerSample& sample) { waiting_.push_back(sample); }
+  /// Packets of the station, as events record them; before the state of the next tick.
+  void take(const proto::EventRecord& packets);
   /// The swarm at a tick, with what programs have set for the step from there. Ticks ascend by one.
   void advance(const SwarmView& swarm);
   /// The alarms since the last call, in order.
@@ -102,7 +104,8 @@ class Monitor {
 
   const RunPlan& plan_;
   const MonitorSettings settings_;
-  const CommandTable declared_;
+  CommandTable declared_;
+  const std::vector<bool> commanded_by_station_;  ///< by robot
   const RobotParameters parameters_;
   const MotorRule motors_;
   std::vector<std::uint32_t> tracked_, watched_;  ///< ascending ids

@@ -1,6 +1,8 @@
 /// What a user may set of the monitor.
 #pragma once
 
+#include "clients/monitor/station_commands.hpp"
+
 namespace kilotwin::monitor {
 
 struct MonitorSettings {
@@ -10,6 +12,8 @@ struct MonitorSettings {
   double warm_up_s = 30;
   /// Standard deviation of the time at which a robot follows a change of its command.
   double command_jitter_s = 0.05;
+  /// What the station's messages command to robots that have neither a shadow program nor declared commands; empty: nothing.
+  StationCommands station_commands{};
 };
 
 /// Bounds of the settings, for whoever reads them.

@@ -133,6 +133,34 @@ TEST(Monitor, AMotorThatFailsIsNamed) {
   RecordProperty("delay_ms", static_cast<int>(1e3 * (alarms[0].time_s - 90)));
 }
 
+/// Robots without shadows: the station's packets tell what they were commanded.
+TEST(Monitor, AMotorThatFailsIsNamedByWhatTheStationSent) {
+  ArenaOptions options;
+  options.robots = 10;
+  options.side_mm = 1500;
+  options.model = noisy(0.001);
+  options.faults =
+      "effect { name: \"failed\" acts_on: WHEEL_GAIN wheel: LEFT_WHEEL robot: 3 function { of: TIME steps { at: 90 "
+      "value: 0 value: -1 } } }";
+  MonitorSettings settings;
+  settings.station_commands = station_commands_of("3=stop,4=straight,1=left,2=right");
+  VirtualArena arena(options, settings);
+  const std::vector<Alarm> alarms = play(arena, 130);
+  ASSERT_FALSE(alarms.empty());
+  EXPECT_EQ(alarms[0].robots, std::vector<std::uint32_t>{3}) << lines(alarms);
+  EXPECT_EQ(alarms[0].suspect, Suspect::kGainLeft) << lines(alarms);
+  EXPECT_GT(alarms[0].time_s, 90);
+  EXPECT_LT(alarms[0].time_s, 110);
+  EXPECT_EQ(arena.monitor().totals().robots_watched, 10u);
+}
+
+TEST(Monitor, StationCommandsAreRead) {
+  EXPECT_EQ(station_commands_of("1=left,15=stop"),
+            (StationCommands{{1, MotionCommand::kTurnLeft}, {15, MotionCommand::kStop}}));
+  for (const char* wrong : {"", "left", "1=", "16=left", "1=up", "1=left;2=right", "=left"})
+    EXPECT_THROW(static_cast<void>(station_commands_of(wrong)), UserError) << wrong;
+}
+
 TEST(Monitor, AKnockedCameraIsNoFaultOfRobots) {
   ArenaOptions options;
   options.robots = 10;

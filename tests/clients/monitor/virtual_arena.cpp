@@ -7,6 +7,9 @@
 
 #include "core/base/ids.hpp"
 #include "core/base/pose.hpp"
+#include "core/observations/events.hpp"
+#include "idl/recording.pb.h"
+#include "services/ark/ark_message.hpp"
 #include "tests/support/scenes.hpp"
 
 namespace kilotwin::monitor::testing {
@@ -32,9 +35,10 @@ std::vector<kilotwin::testing::ScenePose> crowd(const ArenaOptions& options) {
                                          options.side_mm - 4 * kNearWall_mm, 45, options.seed);
 }
 
-RunPlan watched_plan(const ArenaOptions& options) {
-  return kilotwin::testing::make_plan(arena_text(options) + options.tracker + " robots { count: " +
-                                          std::to_string(options.robots) + " body: TRACKED says { shadow: true } }",
+RunPlan watched_plan(const ArenaOptions& options, bool shadow) {
+  return kilotwin::testing::make_plan(arena_text(options) + options.tracker +
+                                          " robots { count: " + std::to_string(options.robots) + " body: TRACKED" +
+                                          (shadow ? " says { shadow: true } }" : " }"),
                                       crowd(options));
 }
 
@@ -48,7 +52,7 @@ RunPlan real_plan(const ArenaOptions& options) {
 
 VirtualArena::VirtualArena(const ArenaOptions& options, const MonitorSettings& settings)
     : options_(options),
-      plan_(watched_plan(options)),
+      plan_(watched_plan(options, settings.station_commands.empty())),
       reality_(real_plan(options)),
       drive_(reality_),
       parameters_(reality_),
@@ -62,6 +66,7 @@ VirtualArena::VirtualArena(const ArenaOptions& options, const MonitorSettings& s
       tracked_(options.robots, 0),
       duties_(options.robots),
       command_(options.robots, MotionCommand::kStop),
+      station_commands_(settings.station_commands),
       until_(options.robots, 0) {
   std::iota(ids_.begin(), ids_.end(), 0u);
   for (std::uint32_t robot = 0; robot < options.robots; ++robot) {
@@ -83,6 +88,7 @@ void VirtualArena::choose_commands() {
             ? x_mm_[robot] * std::cos(heading_rad_[robot]) + y_mm_[robot] * std::sin(heading_rad_[robot])
             : -1;
     MotionCommand& command = command_[robot];
+    const MotionCommand last = command;
     if (outward > 0) {
       if (!is_turn(command)) command = MotionCommand::kTurnLeft;
       until_[robot] = swarm_.tick.count() + 30;
@@ -97,9 +103,27 @@ void VirtualArena::choose_commands() {
           swarm_.tick.count() + static_cast<std::int64_t>(30 + (is_turn(command) ? 60 : 300) * uniform(random_));
     }
     duties_[robot] = duties_of(command, parameters_.calibration(robot));
+    if (!station_commands_.empty()) {
+      if (command != last) tell_monitor(robot, command);
+      continue;
+    }
     swarm_.motor_left[robot] = duties_[robot].left;
     swarm_.motor_right[robot] = duties_[robot].right;
   }
+}
+
+/// As the station's packet is recorded.
+void VirtualArena::tell_monitor(std::uint32_t robot, MotionCommand command) {
+  OverheadFrame frame;
+  frame.tick = swarm_.tick;
+  for (const auto& [type, meaning] : station_commands_) {
+    if (meaning != command) continue;
+    const std::array<ark::ArkMessage, 1> message{{{static_cast<std::uint16_t>(robot), type, 77}}};
+    frame.packets.push_back({OverheadCommand::kRepeat, ark::pack(message)});
+  }
+  proto::Observations observed;
+  note_packets(frame, observed);
+  for (const proto::EventRecord& event : observed.event()) monitor_.take(event);
 }
 
 void VirtualArena::move() {

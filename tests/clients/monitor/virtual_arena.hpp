@@ -48,6 +48,7 @@ class VirtualArena {
  private:
   void choose_commands();
   void move();
+  void tell_monitor(std::uint32_t robot, MotionCommand command);
   [[nodiscard]] TrackerSample picture(std::array<double, 3> knock);
 
   const ArenaOptions options_;
@@ -63,6 +64,8 @@ class VirtualArena {
   std::vector<std::uint8_t> tracked_;
   std::vector<Duties> duties_;
   std::vector<MotionCommand> command_;
+  const StationCommands
+      station_commands_;             ///< not empty: the robots have no shadows, and the station commands them
   std::vector<std::int64_t> until_;  ///< tick at which a robot chooses again
   std::uint64_t frame_ = 0;
   double monitor_ns_ = 0;
