@@ -20,6 +20,7 @@ struct BuildArguments {
   std::vector<fs::path> sources;
   fs::path out;
   std::vector<std::string> define;
+  std::string kilolib;
   bool avr = false, boot_loader = false, wide_int = false;
 };
 
@@ -62,6 +63,7 @@ int build(const BuildArguments& arguments) {
   options.defines = arguments.define;
   options.boot_loader = arguments.boot_loader;
   options.wide_int = arguments.wide_int;
+  options.kilolib = arguments.kilolib;
   if (behaviours::is_station_plugin(arguments.sources)) {
     if (arguments.avr) throw UserError("--avr: a plugin of the station runs on no robot; leave --avr out");
     write_program(behaviours::compile_station_plugin(arguments.sources, options).file, arguments);
@@ -86,6 +88,10 @@ Command add_build(CLI::App& program) {
   app.add_option("-o", arguments->out, "file to write (default: none; the program is only tested)")
       ->type_name("FILE");
   app.add_option("--define", arguments->define, "a macro")->allow_extra_args(false)->type_name("NAME=VALUE");
+  app.add_option(
+         "--kilolib", arguments->kilolib,
+         "the library that the program is written for, kilobot or kilogrid (default: what its sources show)")
+      ->type_name("NAME");
   app.add_flag(
       "--avr", arguments->avr,
       "compile for the ATmega328P and print flash and RAM; with -o, also link firmware (.elf) with a kilolib "

@@ -202,6 +202,12 @@ std::string experiment_as_run(const LoadedExperiment& loaded, const proto::Manif
                     fs::copy_options::overwrite_existing);
       group.mutable_layout()->mutable_poses()->set_csv(copy);
     }
+    if (group.cells().has_configuration()) {
+      const std::string copy = fmt::format("cells-{}.kconf", g);
+      fs::copy_file(loaded.resolve(group.cells().configuration()), directory.path() / copy,
+                    fs::copy_options::overwrite_existing);
+      group.mutable_cells()->set_configuration(copy);
+    }
     if (group.has_eeprom()) {
       const std::string copy = fmt::format("eeprom-{}", g);
       fs::copy(loaded.resolve(group.eeprom()), directory.path() / copy,

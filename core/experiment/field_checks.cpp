@@ -12,6 +12,7 @@
 #include "core/base/say.hpp"
 #include "core/base/time.hpp"
 #include "core/experiment/fields.hpp"
+#include "core/experiment/kilogrid.hpp"
 #include "core/experiment/limits.hpp"
 #include "core/experiment/surroundings.hpp"
 #include "core/plan/world.hpp"
@@ -421,6 +422,7 @@ void check_fields(const LoadedExperiment& loaded) {
     total += stated_count(group);
     known = known && stated_count(group) > 0;
   }
+  check_cells(loaded);
   check_station_files(loaded);
   if (known) check_total(loaded, total);
 }

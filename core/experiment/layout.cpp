@@ -57,6 +57,8 @@ class Placement {
   void place_random(const Group& group);
   void check_movables() const;
   void check_placed(Occupancy& occupancy, const Group& group) const;
+  /// Cells of a Kilogrid have no bodies; their centres lie within the walls.
+  void check_cells_within(const Group& group) const;
   /// The path of an obstacle or movable body that a disc overlaps by more than rounding errors, or "".
   [[nodiscard]] std::string body_within(double x_mm, double y_mm, double radius_mm) const;
   void set_heading(std::uint32_t robot, const proto::Layout& layout, proto::Heading heading, double heading_deg);
@@ -202,6 +204,7 @@ void Placement::place_random(const Group& group) {
   Occupancy occupancy{distance_mm, placed_.x_mm, placed_.y_mm};
   for (const Group& other : groups_) {
     if (other.spec->layout().has_random() && other.first >= group.first) continue;
+    if (other.spec->has_cells()) continue;
     for (std::uint32_t i = 0; i < other.count; ++i) occupancy.add(other.first + i);
   }
   for (std::uint32_t i = 0; i < group.count; ++i) {
@@ -291,6 +294,17 @@ void Placement::check_placed(Occupancy& occupancy, const Group& group) const {
   }
 }
 
+void Placement::check_cells_within(const Group& group) const {
+  for (std::uint32_t cell = group.first; cell < group.first + group.count; ++cell) {
+    const double x_mm = placed_.x_mm[cell], y_mm = placed_.y_mm[cell];
+    if (beyond(x_mm, world_.arena.half_width_mm()) || beyond(y_mm, world_.arena.half_height_mm()))
+      throw error_at(
+          group, cell,
+          fmt::format("{}, a cell, lies outside of the arena; use fewer columns or rows, or a larger arena",
+                      described(cell)));
+  }
+}
+
 PlacedRobots Placement::place() {
   check_movables();
   measure();
@@ -303,7 +317,10 @@ PlacedRobots Placement::place() {
       case proto::Layout::kGrid:
       case proto::Layout::SHAPE_NOT_SET: place_grid(group); break;
     }
-    check_placed(occupancy, group);
+    if (group.spec->has_cells())
+      check_cells_within(group);
+    else
+      check_placed(occupancy, group);
   }
   for (const Group& group : groups_) {
     if (group.spec->layout().has_random()) place_random(group);

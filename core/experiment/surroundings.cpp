@@ -8,6 +8,7 @@
 
 #include "core/base/eeprom_layout.h"
 #include "core/base/error.hpp"
+#include "core/experiment/kilogrid.hpp"
 
 namespace kilotwin {
 namespace {
@@ -116,6 +117,9 @@ std::vector<proto::RobotEeprom> read_eeproms(const LoadedExperiment& loaded,
   for (int g = 0; g < loaded.experiment.robots_size(); ++g) {
     const proto::RobotGroup& group = loaded.experiment.robots(g);
     const std::uint32_t count = counts[static_cast<std::size_t>(g)];
+    if (group.has_cells()) {
+      for (proto::RobotEeprom& eeprom : cell_eeproms(loaded, g, first, count)) eeproms.push_back(std::move(eeprom));
+    }
     if (group.has_eeprom()) {
       const auto fail = [&](const std::string& what) {
         return loaded.locations.error(fmt::format("robots[{}].eeprom", g), what);

@@ -14,7 +14,8 @@ void check_surroundings(const LoadedExperiment& loaded);
 /// The brightness of all pictures of the experiment's light, in order. Throws UserError if one is not a PNG file.
 [[nodiscard]] std::vector<proto::LightRaster> read_light_rasters(const LoadedExperiment& loaded);
 
-/// The EEPROMs that groups state; `counts`: robots per group. Throws UserError if a file does not have 1024 octets.
+/// The EEPROMs that groups state, and those of cells; `counts`: robots per group. Throws UserError if a file does not have 1024
+/// octets.
 [[nodiscard]] std::vector<proto::RobotEeprom> read_eeproms(const LoadedExperiment& loaded,
                                                            const std::vector<std::uint32_t>& counts);
 

@@ -6,7 +6,8 @@
 namespace kilotwin {
 
 void validate(const LoadedExperiment& loaded) {
-  static_cast<void>(place_robots(loaded));  // this also checks the fields
+  const PlacedRobots placed = place_robots(loaded);  // this also checks the fields
+  static_cast<void>(read_eeproms(loaded, placed.group_count));
   static_cast<void>(read_light_rasters(loaded));
 }
 

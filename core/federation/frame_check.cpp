@@ -170,6 +170,7 @@ const char* defect(const Relocation& relocation, const RunPlan& plan) {
     return "its pose is no pose";
   if (body >= (movable ? plan.movables() : plan.robots())) return "its body does not exist";
   if (!movable && plan.tracked(body)) return "its robot is a real one, which no simulation moves";
+  if (!movable && plan.cell_side_mm(body) > 0) return "its robot is a cell of the floor, which nothing moves";
   const Convex shape = movable ? plan.world.movables[body].shape : Convex::disc(kRobotRadius_mm);
   const Place place = Place::at(pose.x_mm, pose.y_mm, pose.heading_rad);
   if (plan.world.arena.clearance_mm(shape, place) < 0) return "its place is not within the arena";

@@ -149,6 +149,10 @@ RunPlan::RunPlan(proto::Manifest given)
     any_tracked_ = any_tracked_ || tracked;
     tracked_.insert(tracked_.end(), group.count(), static_cast<std::uint8_t>(tracked));
     immobile_.insert(immobile_.end(), group.count(), group.immobile());
+    if (group.has_cells()) cell_side_mm_.resize(robots, 0);
+    if (group.has_cells())
+      std::fill_n(cell_side_mm_.begin() + static_cast<std::ptrdiff_t>(uid_of_.size()), group.count(),
+                  group.layout().grid().pitch_mm());
     loop_rate_.insert(
         loop_rate_.end(), group.count(),
         group.loop_rate() == proto::RobotGroup::AS_ON_ROBOT ? LoopRate::kAsOnRobot : LoopRate::kOncePerTick);

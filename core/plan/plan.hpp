@@ -134,6 +134,12 @@ class RunPlan {
   [[nodiscard]] bool any_tracked() const { return any_tracked_; }
   /// Whether the robot is immobile: motors have no effect, and nothing moves it.
   [[nodiscard]] bool immobile(std::uint32_t robot) const { return immobile_[robot] != 0; }
+  /// Side of the robot's square if it is a cell of a Kilogrid, mm; 0: it is a robot.
+  [[nodiscard]] double cell_side_mm(std::uint32_t robot) const {
+    return cell_side_mm_.empty() ? 0 : cell_side_mm_[robot];
+  }
+  /// Whether any is a cell.
+  [[nodiscard]] bool any_cells() const { return !cell_side_mm_.empty(); }
   /// Number of bodies that robots can push: world.movables.
   [[nodiscard]] std::uint32_t movables() const { return static_cast<std::uint32_t>(world.movables.size()); }
   /// Whether the robot runs AVR firmware. The radio simulates its processor.
@@ -174,6 +180,7 @@ class RunPlan {
   // Per robot.
   std::vector<std::uint32_t> program_of_;
   std::vector<std::uint8_t> immobile_, tracked_;
+  std::vector<double> cell_side_mm_;  ///< empty: no cells
   std::vector<LoopRate> loop_rate_;
   std::vector<std::uint16_t> uid_of_;
 };

@@ -18,6 +18,7 @@ struct Incomplete {
 
 /// How a program is made of its sources.
 struct Making {
+  Kilolib kilolib;   ///< whose library the program is written for
   std::string kind;  ///< whatever the search's result depends on besides the sources: the processor, macros
   /// Compiles and links, or returns the cached result. Throws Incomplete if something is undefined, UserError for other errors.
   std::function<CompiledProgram(const ProgramText&)> make;

@@ -285,6 +285,7 @@ struct Toolchain {
   Compiler compiler;
   fs::path cache, runtime;
   Arguments code, includes, defines;
+  Kilolib kilolib = Kilolib::kKilobot;
   bool robot_int = true;  ///< C programs get an int of 16 bits
 
   /// Compiles and links, or returns the cached result. Throws Incomplete if functions are missing, NeedsWideInt if robot_int
@@ -306,7 +307,7 @@ struct Toolchain {
 };
 
 std::string Toolchain::preprocessed(const fs::path& source, const Arguments& dialect) const {
-  const ProgramText text = program_text({source}, cache);
+  const ProgramText text = program_text({source}, cache, kilolib);
   Arguments preprocess{compiler.path, "-E", "-P"};
   append(preprocess, flags_for(text, text.files[0], dialect));
   preprocess.push_back(text.files[0].string());
@@ -325,6 +326,8 @@ CompiledProgram Toolchain::make(const ProgramText& text, const Arguments& dialec
   content += robot_int ? "int 16\n" : "int 32\n";
   const std::string program_content = content;
   std::vector<fs::path> files = text.files;
+  if (const fs::path library = kilolib_source(kilolib, runtime); !library.empty()) files.push_back(library);
+  const std::size_t first_of_simulator = files.size();
   std::vector<std::string> texts;
   bool for_kilombo = std::find(dialect.begin(), dialect.end(), "-DSIMULATOR") != dialect.end();
   for (std::size_t i = 0; i < files.size(); ++i) {
@@ -342,7 +345,7 @@ CompiledProgram Toolchain::make(const ProgramText& text, const Arguments& dialec
       process.output = with_robot_int(process.output);
     }
     texts.push_back(std::move(process.output));
-    if (i + 1 == text.files.size() && for_kilombo) files.push_back(runtime / "simulator.c");
+    if (i + 1 == first_of_simulator && for_kilombo) files.push_back(runtime / "simulator.c");
   }
   const fs::path kept = cache / "programs" / (sha256_hex(content) + ".so");
   if (const auto octets = os::read_if_there(kept)) {
@@ -392,9 +395,10 @@ CompiledProgram complete(const Toolchain& toolchain, const std::vector<fs::path>
                          const Arguments& dialect) {
   std::string kind = "simulation";
   for (const std::string& flag : toolchain.defines) kind += '\n' + flag;
-  return with_companions(sources, toolchain.cache,
-                         {kind, [&](const ProgramText& text) { return toolchain.make(text, dialect); },
-                          [&](const fs::path& source) { return toolchain.preprocessed(source, dialect); }});
+  return with_companions(
+      sources, toolchain.cache,
+      {toolchain.kilolib, kind, [&](const ProgramText& text) { return toolchain.make(text, dialect); },
+       [&](const fs::path& source) { return toolchain.preprocessed(source, dialect); }});
 }
 
 /// complete(), with the robot's int if the program allows it.
@@ -460,6 +464,8 @@ CompiledProgram compile(const std::vector<fs::path>& sources, const CompileOptio
   toolchain.compiler = find_compiler(options.compiler);
   toolchain.cache = os::cache_directory(options.cache_directory);
   toolchain.runtime = unpacked_runtime(toolchain.cache);
+  toolchain.kilolib = kilolib_for(sources, options);
+  append(toolchain.defines, kilolib_flags(toolchain.kilolib, toolchain.runtime));
   toolchain.includes = include_flags(toolchain.compiler, toolchain.runtime);
   toolchain.code = code_flags(toolchain.compiler);
   toolchain.robot_int = !options.wide_int;

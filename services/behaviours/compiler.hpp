@@ -15,6 +15,7 @@ struct CompileOptions {
   bool wide_int =
       false;  ///< programs for the simulation keep the host's int of 32 bits; else it has 16, as on the robot
   bool boot_loader = false;  ///< firmware gets this project's boot loader at 0x7000, as a robot has one
+  std::string kilolib{};     ///< "kilobot" or "kilogrid"; empty: what the sources show
 };
 
 struct CompiledProgram {

@@ -36,8 +36,9 @@ AvrSize compile_for_avr(const std::vector<fs::path>& sources, const CompileOptio
   const std::string size = required_tool("avr-size", "binutils-avr");
   const fs::path runtime = unpacked_runtime(os::cache_directory(options.cache_directory));
   const os::TemporaryFolder folder("kilotwin-avr");
+  const Kilolib kilolib = kilolib_for(sources, options);
   std::vector<std::string> link{gcc, "-mmcu=atmega328p", "-r", "-nostartfiles", "-Wl,-d"};
-  const ProgramText text = program_text(sources, os::cache_directory(options.cache_directory));
+  const ProgramText text = program_text(sources, os::cache_directory(options.cache_directory), kilolib);
   for (const fs::path& source : text.files) {
     const std::string object = (folder.path() / (std::to_string(link.size()) + ".o")).string();
     std::vector<std::string> arguments{gcc,
@@ -49,9 +50,9 @@ AvrSize compile_for_avr(const std::vector<fs::path>& sources, const CompileOptio
                                        "-funsigned-bitfields",
                                        "-fpack-struct",
                                        "-fshort-enums",
-                                       "-fdiagnostics-color=never",
-                                       "-isystem",
-                                       (runtime / "kilolib").string()};
+                                       "-fdiagnostics-color=never"};
+    for (const std::string& flag : kilolib_flags(kilolib, runtime)) arguments.push_back(flag);
+    arguments.insert(arguments.end(), {"-isystem", (runtime / "kilolib").string()});
     for (const std::string& flag : define_flags(options.defines)) arguments.push_back(flag);
     arguments.insert(arguments.end(), {"-c", source.string(), "-o", object});
     const os::ProcessResult result = run_compiler(arguments);

@@ -56,6 +56,32 @@ std::vector<std::string> define_flags(const std::vector<std::string>& defines) {
   return flags;
 }
 
+Kilolib kilolib_for(const std::vector<fs::path>& sources, const CompileOptions& options) {
+  const Kilolib shown = kilolib_of(sources);
+  if (options.kilolib == "kilobot") return Kilolib::kKilobot;
+  if (options.kilolib == "kilogrid") return shown == Kilolib::kKilobot ? Kilolib::kKilogridRobot : shown;
+  if (options.kilolib.empty()) return shown;
+  throw UserError("--kilolib " + options.kilolib + ": no such library; it takes kilobot or kilogrid");
+}
+
+std::vector<std::string> kilolib_flags(Kilolib kilolib, const fs::path& runtime) {
+  if (kilolib == Kilolib::kKilobot) return {};
+  return {"-DKILOTWIN_KILOGRID", "-isystem", (runtime / "kilogrid").string()};
+}
+
+fs::path kilolib_source(Kilolib kilolib, const fs::path& runtime) {
+  if (kilolib == Kilolib::kKilobot) return {};
+  return runtime / (kilolib == Kilolib::kKilogridRobot ? "kilogrid/robot.c" : "kilogrid/module.c");
+}
+
+std::vector<std::string> kilolib_notes(Kilolib kilolib, const fs::path& source) {
+  if (kilolib == Kilolib::kKilobot) return {};
+  return {source.string() +
+          (kilolib == Kilolib::kKilogridRobot ? ": a robot's program for the Kilogrid; compiled with "
+                                              : ": a module's program for the Kilogrid; compiled with ") +
+          "the Kilogrid's kilolib"};
+}
+
 void check_sources(const std::vector<fs::path>& sources) {
   if (sources.empty()) throw UserError("no program given; name one or more C files");
   for (const fs::path& source : sources) {

@@ -8,6 +8,7 @@
 
 #include "core/os/process.hpp"
 #include "services/behaviours/compiler.hpp"
+#include "services/behaviours/program_text.hpp"
 
 namespace kilotwin::behaviours {
 
@@ -16,6 +17,18 @@ namespace kilotwin::behaviours {
 
 /// The -D options. Throws UserError if a definition is not NAME or NAME=VALUE.
 [[nodiscard]] std::vector<std::string> define_flags(const std::vector<std::string>& defines);
+
+/// The library that the options name, else the one that the sources show.
+[[nodiscard]] Kilolib kilolib_for(const std::vector<std::filesystem::path>& sources, const CompileOptions& options);
+
+/// The -D and -isystem options for a library's headers, before those of kilolib; none for kilolib itself.
+[[nodiscard]] std::vector<std::string> kilolib_flags(Kilolib, const std::filesystem::path& runtime);
+
+/// The source that is compiled with a program for its library, or "".
+[[nodiscard]] std::filesystem::path kilolib_source(Kilolib, const std::filesystem::path& runtime);
+
+/// A line for the user about a library that is not kilolib itself, or nothing.
+[[nodiscard]] std::vector<std::string> kilolib_notes(Kilolib, const std::filesystem::path& source);
 
 /// Throws UserError if there is no source, or one is not a readable C or C++ file.
 void check_sources(const std::vector<std::filesystem::path>& sources);

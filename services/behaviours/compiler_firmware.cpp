@@ -1,4 +1,5 @@
 // Compiles programs for the robot's processor: avr-gcc, linked with this project's kilolib for the AVR.
+#include <algorithm>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -41,14 +42,22 @@ std::vector<std::string> common_arguments(const fs::path& gcc, const fs::path& r
 /// avr-gcc with the flags and the runtime, which do not depend on the program.
 struct AvrToolchain {
   fs::path gcc, cache, runtime;
+  Kilolib kilolib;
   std::vector<std::string> flags;
   std::string content;  ///< whatever else the result depends on: for the keys of the cache
 
-  explicit AvrToolchain(const CompileOptions& options)
-      : gcc(os::find_executable("avr-gcc")), cache(os::cache_directory(options.cache_directory)) {
+  AvrToolchain(const std::vector<fs::path>& sources, const CompileOptions& options)
+      : gcc(os::find_executable("avr-gcc")),
+        cache(os::cache_directory(options.cache_directory)),
+        kilolib(kilolib_for(sources, options)) {
     if (gcc.empty()) throw UserError("no avr-gcc on this machine; apt-get install gcc-avr avr-libc binutils-avr");
     runtime = unpacked_runtime(cache);
+    if (kilolib == Kilolib::kKilogridModule)
+      throw UserError(sources.front().string() +
+                      ": a module's program for the Kilogrid runs natively only; leave avr out");
     flags = common_arguments(gcc, runtime);
+    const std::vector<std::string> library = kilolib_flags(kilolib, runtime);
+    flags.insert(std::find(flags.begin(), flags.end(), "-isystem"), library.begin(), library.end());
     content = run_compiler({gcc.string(), "--version"}).output;
     for (const std::string& flag : flags) content += flag + '\n';
     const std::vector<std::string> defines = define_flags(options.defines);
@@ -110,6 +119,8 @@ std::string AvrToolchain::link(const ProgramText& text, bool boot_loader) const 
   }
   arguments.push_back("-fdebug-prefix-map=" + runtime.string() + "=/kilotwin");
   for (const fs::path& file : text.files) arguments.push_back(file.string());
+  if (const fs::path library = kilolib_source(kilolib, runtime); !library.empty())
+    arguments.push_back(library.string());
   arguments.insert(arguments.end(),
                    {(runtime / "avr/kilolib.c").string(), (runtime / "avr/infrared.S").string(), "-lm"});
   if (boot_loader)
@@ -148,15 +159,16 @@ CompiledProgram AvrToolchain::make(const ProgramText& text, bool boot_loader) co
 
 CompiledProgram compile_firmware(const std::vector<fs::path>& sources, const CompileOptions& options) {
   check_sources(sources);
-  const AvrToolchain toolchain(options);
+  const AvrToolchain toolchain(sources, options);
   std::string kind = "robot";
   for (const std::string& define : options.defines) kind += '\n' + define;
-  return with_companions(sources, toolchain.cache,
-                         {kind, [&](const ProgramText& text) { return toolchain.make(text, options.boot_loader); },
-                          [&](const fs::path& source) {
-                            const ProgramText text = program_text({source}, toolchain.cache);
-                            return toolchain.preprocessed(text.files[0], false).value_or("");
-                          }});
+  return with_companions(
+      sources, toolchain.cache,
+      {toolchain.kilolib, kind, [&](const ProgramText& text) { return toolchain.make(text, options.boot_loader); },
+       [&](const fs::path& source) {
+         const ProgramText text = program_text({source}, toolchain.cache, toolchain.kilolib);
+         return toolchain.preprocessed(text.files[0], false).value_or("");
+       }});
 }
 
 }  // namespace kilotwin::behaviours

@@ -201,7 +201,8 @@ std::optional<FoundHeader> header_around(const fs::path& includer, const std::st
 
 class Preparation {
  public:
-  Preparation(ProgramText& result, fs::path cache) : result_(result), cache_(std::move(cache)) {}
+  Preparation(ProgramText& result, fs::path cache, Kilolib kilolib)
+      : result_(result), cache_(std::move(cache)), kilolib_(kilolib) {}
 
   /// The file to compile: `file` itself, or a copy with changed #include lines.
   fs::path prepared(const fs::path& file) {
@@ -287,17 +288,19 @@ class Preparation {
   }
 
   /// Whether a header is found by the compiler's search path: in the runtime or among the compiler's own.
-  static bool is_runtime_header(const std::string& name) {
+  [[nodiscard]] bool is_runtime_header(const std::string& name) const {
     static const std::set<std::string> kCompilers{"stdbool.h", "stddef.h", "stdarg.h",
                                                   "float.h",   "iso646.h", "stdalign.h"};
     const auto files = runtime_files();
     return kCompilers.contains(name) || std::any_of(files.begin(), files.end(), [&](const RuntimeFile& file) {
-             return file.name == "libc/" + name || file.name == "kilolib/" + name;
+             return file.name == "libc/" + name || file.name == "kilolib/" + name ||
+                    (kilolib_ != Kilolib::kKilobot && file.name == "kilogrid/" + name);
            });
   }
 
   ProgramText& result_;
   fs::path cache_;
+  Kilolib kilolib_;
   Listings listings_;
   std::map<fs::path, fs::path> done_;
 };
@@ -309,9 +312,27 @@ bool is_cpp(const fs::path& source) {
   return extension == ".cpp" || extension == ".cc" || extension == ".cxx" || extension == ".C";
 }
 
-ProgramText program_text(const std::vector<fs::path>& sources, const fs::path& cache) {
+Kilolib kilolib_of(const std::vector<fs::path>& sources) {
+  static const std::regex kModule(R"(\bmodule_(init|start)\s*\()"), kMessage(R"(\bIR_message_t\b)");
+  Kilolib result = Kilolib::kKilobot;
+  for (const fs::path& source : sources) {
+    const std::string text = os::read_if_there(source).value_or("");
+    // Most programs mention neither, and std::regex is slow.
+    if (text.find("module_") != std::string::npos && std::regex_search(code_of(text), kModule))
+      return Kilolib::kKilogridModule;
+    if (text.find("IR_message_t") != std::string::npos && std::regex_search(code_of(text), kMessage))
+      result = Kilolib::kKilogridRobot;
+    for (const Include& include : includes_of(text)) {
+      const std::string name = fs::path(include.name).filename().string();
+      if (name.starts_with("kilob_") || name == "kilo_rand_lib.h") result = Kilolib::kKilogridRobot;
+    }
+  }
+  return result;
+}
+
+ProgramText program_text(const std::vector<fs::path>& sources, const fs::path& cache, Kilolib kilolib) {
   ProgramText result;
-  Preparation preparation(result, cache);
+  Preparation preparation(result, cache, kilolib);
   for (const fs::path& source : sources) {
     if (sources.size() > 1 && is_kilolib_source(source, os::read_if_there(source).value_or(""))) {
       preparation.note(source.string() + ": left aside; programs are linked with Kilotwin's own kilolib");

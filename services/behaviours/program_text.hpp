@@ -2,6 +2,7 @@
 /// in folders that the makefile names, and with further sources that it links.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <set>
@@ -9,6 +10,16 @@
 #include <vector>
 
 namespace kilotwin::behaviours {
+
+/// Whose library a program is written for.
+enum class Kilolib : std::uint8_t {
+  kKilobot,        ///< kilolib as published
+  kKilogridRobot,  ///< the Kilogrid's: IR_message_t, utils.h, kilob_*.h
+  kKilogridModule  ///< that of the Kilogrid's cells: module_init(), set_IR_message()
+};
+
+/// Finds out by names that only one of the libraries has.
+[[nodiscard]] Kilolib kilolib_of(const std::vector<std::filesystem::path>& sources);
 
 struct ProgramText {
   /// The files to compile, in order: the sources, or copies in the cache with changed #include lines. Copies keep the line numbers
@@ -24,7 +35,7 @@ struct ProgramText {
 
 /// Reads the sources. Throws UserError if all of them are copies of kilolib.
 [[nodiscard]] ProgramText program_text(const std::vector<std::filesystem::path>& sources,
-                                       const std::filesystem::path& cache);
+                                       const std::filesystem::path& cache, Kilolib kilolib);
 
 /// Searches the folders around the sources for files that define one of the missing functions or variables and no main().
 /// `preprocessed` returns a source after preprocessing, or "" on failure.

@@ -184,7 +184,8 @@ std::vector<std::string> robot_warnings(const std::vector<fs::path>& sources, co
   if (avr.empty() || host.empty()) return {};
   const fs::path cache = os::cache_directory(options.cache_directory);
   const fs::path runtime = unpacked_runtime(cache);
-  const ProgramText text = program_text(sources, cache);
+  const Kilolib kilolib = kilolib_for(sources, options);
+  const ProgramText text = program_text(sources, cache, kilolib);
   std::vector<std::string> result;
   const fs::path dump = cache / ("gimple." + std::to_string(getpid()) + '.' +
                                  std::to_string(std::hash<std::string>{}(sources.front().string())));
@@ -193,6 +194,7 @@ std::vector<std::string> robot_warnings(const std::vector<fs::path>& sources, co
     Arguments shared{"-std=gnu11", "-funsigned-char", "-fpack-struct", "-fshort-enums", "-DF_CPU=8000000"};
     for (const std::string& flag : define_flags(options.defines)) shared.push_back(flag);
     shared.insert(shared.end(), kQuestions.begin(), kQuestions.end());
+    for (const std::string& flag : kilolib_flags(kilolib, runtime)) shared.push_back(flag);
     shared.insert(shared.end(), {"-isystem", (runtime / "kilolib").string()});
     Arguments on_robot{
         avr, "-mmcu=atmega328p", "-S", "-O0", "-o", "/dev/null", "-fdump-tree-gimple-lineno=" + dump.string()};
@@ -244,13 +246,15 @@ std::vector<std::string> usual_warnings(const std::vector<fs::path>& sources, co
   const std::string host = os::find_executable("gcc").string();
   if (host.empty()) return {};
   const fs::path cache = os::cache_directory(options.cache_directory), runtime = unpacked_runtime(cache);
-  const ProgramText text = program_text(sources, cache);
+  const Kilolib kilolib = kilolib_for(sources, options);
+  const ProgramText text = program_text(sources, cache, kilolib);
   std::vector<std::string> result;
   for (const fs::path& file : text.files) {
     if (is_cpp(file)) continue;
     Arguments arguments{host, "-std=gnu11", "-funsigned-char", "-fshort-enums", "-DF_CPU=8000000"};
     for (const std::string& flag : define_flags(options.defines)) arguments.push_back(flag);
     arguments.insert(arguments.end(), kUsual.begin(), kUsual.end());
+    for (const std::string& flag : kilolib_flags(kilolib, runtime)) arguments.push_back(flag);
     arguments.insert(arguments.end(), {"-isystem", (runtime / "kilolib").string()});
     append_host_headers(arguments, host, runtime);
     arguments.push_back(file.string());

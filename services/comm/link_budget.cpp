@@ -30,6 +30,8 @@ LinkBudget::LinkBudget(const RunPlan& plan)
       mm_per_db_(1 / decay_db_per_mm_),
       reach_mm_(range_mm_),
       certain_square_(range_square_) {
+  for (std::uint32_t i = 0; plan.any_cells() && i < plan.robots(); ++i)
+    cell_half_mm_.push_back(plan.cell_side_mm(i) / 2);
   if (is_disc_) return;
   const PropagationSettings& model = plan.radio_settings().propagation;
   body_loss_db_ = model.body_loss_db;
@@ -69,6 +71,16 @@ LinkBudget::LinkBudget(const RunPlan& plan)
     known_.assign(std::size_t{row_} * plan.robots(), {kNobody, 0});
   }
   find_reach();
+}
+
+/// Squares are half-open, so that a robot on a border is above one cell.
+bool LinkBudget::above_cell(const Neighbourhood& robots, std::uint32_t a, std::uint32_t b) const {
+  if (cell_half_mm_[a] > 0 && cell_half_mm_[b] > 0) return false;
+  const bool first = cell_half_mm_[a] > 0;
+  const std::uint32_t cell = first ? a : b, robot = first ? b : a;
+  const double dx = robots.x_mm(robot) - robots.x_mm(cell), dy = robots.y_mm(robot) - robots.y_mm(cell);
+  const double half_mm = cell_half_mm_[cell];
+  return dx >= -half_mm && dx < half_mm && dy >= -half_mm && dy < half_mm;
 }
 
 double LinkBudget::Pattern::amplitude_db() const {

@@ -39,9 +39,14 @@ class LinkBudget {
   /// Whether the margin is above 0, or, without PROPAGATION, the distance within range.
   [[nodiscard]] bool hears(const Neighbourhood& robots, std::uint32_t receiver, std::uint32_t sender) {
     const double square = robots.square(receiver, sender);
-    if (is_disc_) return square <= range_square_;
+    if (is_disc_) return square <= range_square_ && reaches(robots, receiver, sender);
     if (square <= certain_square_) return true;
     return square <= robots.range_square() && margin_db(robots, sender, receiver) > 0;
+  }
+  /// Whether two robots within range hear each other, as far as cells of a Kilogrid decide: a cell and the robots above its square
+  /// do, two cells do not.
+  [[nodiscard]] bool reaches(const Neighbourhood& robots, std::uint32_t a, std::uint32_t b) const {
+    return cell_half_mm_.empty() || (cell_half_mm_[a] == 0 && cell_half_mm_[b] == 0) || above_cell(robots, a, b);
   }
   /// Noise of one packet, dB, to be added to the margin. `instant`: start of the packet, which distinguishes packets of a pair.
   [[nodiscard]] double packet_noise_db(std::uint32_t sender, std::uint32_t receiver, std::int64_t instant) const;
@@ -82,6 +87,7 @@ class LinkBudget {
     return std::uint64_t{sender} << 32 | receiver;
   }
 
+  [[nodiscard]] bool above_cell(const Neighbourhood&, std::uint32_t a, std::uint32_t b) const;
   void find_reach();
   /// Bound of the random offset of a pair, all parts together.
   [[nodiscard]] double max_spread_db() const;
@@ -104,6 +110,7 @@ class LinkBudget {
   bool directional_ = false, sender_matters_ = false, receiver_matters_ = false;
   double reach_mm_, certain_square_;
   Pattern power_pattern_, sensitivity_pattern_;
+  std::vector<double> cell_half_mm_;             ///< per robot: half a cell's side, 0 for robots; empty: no cells
   std::vector<Link> links_;                      ///< ascending keys
   std::vector<double> heading_rad_, faced_rad_;  ///< per robot: current heading, and the one of facing_
   std::vector<Vector> facing_;                   ///< per robot: unit vector of its heading

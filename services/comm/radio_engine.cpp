@@ -382,8 +382,10 @@ void RadioEngine::receive_packet(const Transmission& packet, Tick now) {
 void RadioEngine::receive_in_range(const Transmission& packet, bool jammed, Tick now) {
   neighbourhood_.visit(packet.sender, [&](std::uint32_t receiver, double square_mm2) {
     if ((state_[receiver] & (kReceptive | kFirmware)) == 0) return;
+    if (!links_.reaches(neighbourhood_, receiver, packet.sender)) return;
     const bool is_lost = jammed || std::any_of(rivals_.begin(), rivals_.end(), [&](std::uint32_t rival) {
-                           return rival == receiver || neighbourhood_.in_range(receiver, rival);
+                           return rival == receiver || (neighbourhood_.in_range(receiver, rival) &&
+                                                        links_.reaches(neighbourhood_, receiver, rival));
                          });
     receive(packet, receiver, is_lost, now, [&] { return ranging_.gains(__builtin_sqrt(square_mm2)); });
   });
@@ -455,7 +457,9 @@ void RadioEngine::receive_copy(const OverheadController::Copy& copy, std::uint32
       for (const LinkTable::Link& link : table_.of(transmission.sender))
         jammed_[link.receiver] |= link.margin_db > static_cast<float>(-links_.notice_db());
     } else {
-      neighbourhood_.visit(transmission.sender, [&](std::uint32_t receiver, double) { jammed_[receiver] = 1; });
+      neighbourhood_.visit(transmission.sender, [&](std::uint32_t receiver, double) {
+        jammed_[receiver] |= links_.reaches(neighbourhood_, receiver, transmission.sender);
+      });
     }
   }
   receptions_.begin_message(copy.message);

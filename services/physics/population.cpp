@@ -32,12 +32,13 @@ Population::Population(const RunPlan& plan, PartitionId partition, DriveModel dr
   for (std::uint32_t robot = 0; robot < robots_; ++robot) {
     const Pose pose = plan.initial_pose(robot);
     const double x = pose.x_mm, y = pose.y_mm, heading = wrapped(pose.heading_rad);
-    const bool tracked = plan.tracked(robot);
+    // A cell of a Kilogrid has no body either: it is listed like a tracked robot that is never there.
+    const bool is_cell = plan.cell_side_mm(robot) > 0, tracked = plan.tracked(robot) || is_cell;
     if (tracked) {
       is_tracked_.resize(robots_, 0);
       is_tracked_[robot] = 1;
       tracked_.add(robot, x, y, heading, 1, 1);
-      absent_.push_back(!plan.tracking_settings().present_at_start);
+      absent_.push_back(is_cell || !plan.tracking_settings().present_at_start);
       absentees_ += absent_.back();
       on_other_.push_back(0);
       memory_.start(robot, tracked_.memory_of(tracked_.size() - 1));

@@ -6,7 +6,8 @@
 ///   (the engine moves the own bodies among the known from k to k+1)
 ///   end():    listed at k+1 = own, and absent tracked robots where they were last; what the model's effects remember
 ///
-/// A tracked robot that is absent has no body: it is listed, so that every robot has a pose, and known to no engine.
+/// A tracked robot that is absent has no body: it is listed, so that every robot has a pose, and known to no engine. So is a cell
+/// of a Kilogrid.
 #pragma once
 
 #include <cstdint>

@@ -26,14 +26,20 @@ int usleep(unsigned long microseconds) {
 void _delay_loop_1(uint8_t count) { kilotwin_spend(3u * (count == 0 ? 256u : count)); }
 void _delay_loop_2(uint16_t count) { kilotwin_spend(4u * (count == 0 ? 65536u : count)); }
 
+/* Of programs whose long has 64 bits, and of those with the robot's 32: time.h. */
 time_t time(time_t* seconds) {
   const time_t now = kilo_ticks / TICKS_PER_SEC;
   if (seconds != NULL) *seconds = now;
   return now;
 }
+uint32_t kilotwin_robot_time(uint32_t* seconds) __asm__("time") __attribute__((weak));
+uint32_t kilotwin_robot_time(uint32_t* seconds) {
+  const uint32_t now = kilo_ticks / TICKS_PER_SEC;
+  if (seconds != NULL) *seconds = now;
+  return now;
+}
 
 clock_t clock(void) { return kilo_ticks; }
-double difftime(time_t later, time_t earlier) { return (double)(later - earlier); }
 
 /* ADC channels: 6 battery, 7 light, 8 temperature. */
 static struct kilotwin_adc converter;

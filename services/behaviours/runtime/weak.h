@@ -28,7 +28,7 @@ WEAK(pow) WEAK(powf) WEAK(fmod) WEAK(fmodf) WEAK(remainder) WEAK(remainderf) WEA
 WEAK(fmin) WEAK(fminf) WEAK(fmax) WEAK(fmaxf) WEAK(fdim) WEAK(fdimf) WEAK(copysign) WEAK(copysignf)
 WEAK(lround) WEAK(lroundf) WEAK(lrint) WEAK(lrintf) WEAK(llround) WEAK(llroundf) WEAK(llrint) WEAK(llrintf)
 WEAK(fma) WEAK(fmaf) WEAK(modf) WEAK(modff) WEAK(frexp) WEAK(frexpf) WEAK(ldexp) WEAK(ldexpf) WEAK(sincos)
-WEAK(sincosf) WEAK(time) WEAK(clock) WEAK(difftime) WEAK(sleep) WEAK(usleep) WEAK(creal) WEAK(cimag) WEAK(cabs)
+WEAK(sincosf) WEAK(time) WEAK(clock) WEAK(sleep) WEAK(usleep) WEAK(creal) WEAK(cimag) WEAK(cabs)
 WEAK(carg) WEAK(conj) WEAK(cexp) WEAK(clog) WEAK(cpow) WEAK(csqrt) WEAK(crealf) WEAK(cimagf) WEAK(cabsf)
 WEAK(cargf) WEAK(conjf) WEAK(cexpf) WEAK(eeprom_read_byte) WEAK(eeprom_read_word) WEAK(eeprom_read_dword)
 WEAK(eeprom_read_float) WEAK(eeprom_read_block) WEAK(eeprom_write_byte) WEAK(eeprom_write_word)

@@ -107,6 +107,19 @@ TEST(CompilerCache, ANearerSourceTakesThePlaceOfOneThatWasFound) {
   EXPECT_FALSE(mentions(program.notes, "lib/colour.c"));
 }
 
+TEST(CompilerCache, AProgramThatNoLongerNeedsASourceLosesIt) {
+  const Folder folder, fresh;
+  folder.write("colour.c", colour_source(3));
+  const fs::path source = folder.write("a.c", kIncomplete);
+  EXPECT_TRUE(mentions(compile({source}, cached()).notes, "colour.c: compiled too"));
+  folder.write("a.c", "#include <kilolib.h>\nvoid setup() {} void loop() { set_color(5); }\n" + kMain);
+  const CompiledProgram program = compile({source}, cached());
+  EXPECT_FALSE(mentions(program.notes, "colour.c"));
+  CompileOptions elsewhere;
+  elsewhere.cache_directory = fresh.path();
+  EXPECT_EQ(program.sha256, compile({source}, elsewhere).sha256);
+}
+
 TEST(CompilerCache, WarningsNameTheFolderThatIsCompiled) {
   const std::string text =
       "#include <kilolib.h>\nvoid setup() {} void loop() { int x = 1; if (x = 2) set_color(x); }\n" + kMain;

@@ -30,6 +30,15 @@ bool holds(const std::string& statements, const std::string& condition, const st
   return swarm.led(0) == 3;
 }
 
+TEST(RobotInt, TheClockHasTheWidthOfTheProgramsLong) {
+  const std::string before = "#include <time.h>\nstatic long t[2] = {-1, 7};\n";
+  EXPECT_TRUE(holds("time(&t[0]);", "t[0] >= 0 && t[0] < 9 && t[1] == 7", before));
+  EXPECT_TRUE(
+      holds("time_t now = time(NULL); clock_t ticks = clock();",
+            "sizeof(time_t) == 4 && sizeof(clock_t) == 4 && now < 9 && ticks < 90 && difftime(now, now + 2) == -2",
+            before));
+}
+
 TEST(RobotInt, WrapsLikeTheRobots) {
   // A sum of 300 readings of a light sensor, the classical mistake.
   EXPECT_TRUE(holds("int sum = 0; for (int i = 0; i < 300; i++) sum += 512;", "sum == (int16_t)(300 * 512)"));

@@ -1,6 +1,7 @@
 /* kilolib for the robot's processor, an ATmega328P at 8 MHz, written from the robot's observed behaviour and timing. It has the
  * headers, the packet format, the pins and the EEPROM layout of the original library, so robots with either library can
  * communicate. */
+#undef KILOTWIN_KILOGRID /* its message types are those of programs */
 #include <avr/eeprom.h>
 #include <avr/interrupt.h>
 #include <avr/io.h>

@@ -26,6 +26,19 @@ typedef enum {
   CALIB = 0x8A
 } message_type_t;
 
+#ifdef KILOTWIN_KILOGRID
+/* The Kilogrid's kilolib has another name for the same message, and further types. */
+typedef message_t IR_message_t;
+
+typedef enum {
+  TEST = 0x0A,
+  TRACKING = 0x10,
+  GO_STRAIGHT = 0x7D,
+  TURN_LEFT = 0x7E,
+  TURN_RIGHT = 0x7F
+} IR_message_type_t;
+#endif
+
 typedef enum {
   CALIB_SAVE = 0,
   CALIB_UID = 1,
