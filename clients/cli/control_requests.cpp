@@ -17,6 +17,11 @@ namespace {
 using nlohmann::ordered_json;
 using Status = RunControl::Status;
 
+/// The station sees the files of its own disk only; of others it knows once all services have stepped beyond the tick.
+constexpr const char* kSavedOnceItGoesOn =
+    "; if its services have disks of their own, a paused run counts as saved once it goes on: kilotwin control "
+    "step 1";
+
 Status act(RunControl& control, const ControlRequest& request, const Status& before) {
   const auto ask = [&](kilotwin_open_RunCommand command) {
     control.send(command, request.steps, request.patience);
@@ -52,7 +57,7 @@ Status act(RunControl& control, const ControlRequest& request, const Status& bef
   const bool is_paused = before.phase == kilotwin_open_PAUSED;
   const std::int64_t least = is_paused ? before.tick : std::max(before.tick, before.saved_tick) + 1;
   return control.await([&](const Status& now) { return now.saved_tick > 0 && now.saved_tick >= least; },
-                       "save its state", request.patience);
+                       "save its state", request.patience, is_paused ? kSavedOnceItGoesOn : "");
 }
 
 ControlRequest request_of(const ordered_json& line, std::chrono::duration<double> patience) {

@@ -146,14 +146,14 @@ void RunControl::place(const Relocation& where, Seconds patience) {
 }
 
 RunControl::Status RunControl::await(const std::function<bool(const Status&)>& done, const std::string& what,
-                                     Seconds patience) {
+                                     Seconds patience, const std::string& hint) {
   const auto until = deadline(patience);
   std::unique_lock lock(mutex_);
   while (!done(*status_) && !is_over(status_->phase) && !gone_) {
     if (Clock::now() > until) {
-      throw RunError(fmt::format("the run {} did not {} within {:g} s; it is at {:.3f} s{}{}", status_->name, what,
-                                 patience.count(), status_->simulated_s, status_->note[0] == '\0' ? "" : ": ",
-                                 status_->note));
+      throw RunError(fmt::format("the run {} did not {} within {:g} s; it is at {:.3f} s{}{}{}", status_->name,
+                                 what, patience.count(), status_->simulated_s, status_->note[0] == '\0' ? "" : ": ",
+                                 status_->note, hint));
     }
     if (interrupted() != 0) throw RunError("interrupted");
     arrived_.wait_for(lock, kPoll);

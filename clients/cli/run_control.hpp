@@ -29,9 +29,9 @@ class RunControl {
   /// paused, until the station has the request. Throws RunError after `patience`.
   void place(const Relocation& where, std::chrono::duration<double> patience);
   /// Waits until the run's status satisfies `done`, or the run is over, and returns the last status. Throws RunError after
-  /// `patience`: "the run ... did not WHAT within ... s".
+  /// `patience`: "the run ... did not WHAT within ... s; it is at ... s", and the hint, if there is one: what may be done.
   Status await(const std::function<bool(const Status&)>& done, const std::string& what,
-               std::chrono::duration<double> patience);
+               std::chrono::duration<double> patience, const std::string& hint = "");
 
  private:
   /// Sends a request of this client, and waits until the station has it.

@@ -109,6 +109,41 @@ TEST_F(Control, PausesStepsContinuesAndStops) {
   EXPECT_EQ(resumed.resumed_from_tick, at + 6);
 }
 
+TEST_F(Control, APausedRunWithSeveralDisksIsSavedOnceItGoesOn) {
+  const std::string domain = std::to_string(domain_);
+  ASSERT_EQ(kilotwin({"run", source("experiments/disperse.txtpb"), "--robots", "4", "--duration", "600", "--pace",
+                      "1", "--partitions", "1x1", "--prepare", "--out", scratch_ / "run"},
+                     scratch_)
+                .status,
+            0);
+  std::filesystem::copy(scratch_.path() / "run", scratch_.path() / "other",
+                        std::filesystem::copy_options::recursive);
+  // Physics has a disk of its own.
+  std::vector<std::unique_ptr<Process>> services;
+  for (const auto& [service, directory, more] :
+       {std::tuple<std::string, std::string, Words>{"physics", "other", {"--partition", "0,0"}},
+        {"comm", "run", {}},
+        {"behaviours", "run", {"--share", "1/1"}},
+        {"station", "run", {}}}) {
+    Words words{program(), "service", service, "--run", scratch_ / directory, "--domain", domain};
+    words.insert(words.end(), more.begin(), more.end());
+    std::filesystem::create_directories(scratch_.path() / ("of-" + service));
+    services.push_back(std::make_unique<Process>(words, scratch_.path() / ("of-" + service)));
+  }
+  ASSERT_TRUE(eventually([this] { return control_.readers() > 0 && latest().phase == kilotwin_open_RUNNING; }));
+  ASSERT_EQ(kilotwin({"control", "pause", "--domain", domain}, scratch_).status, 0);
+  const Outcome unsure = kilotwin({"control", "checkpoint", "--domain", domain}, scratch_);
+  EXPECT_EQ(unsure.status, 1);
+  EXPECT_NE(unsure.err.find("did not save its state within 10 s"), std::string::npos) << unsure.err;
+  EXPECT_NE(unsure.err.find("counts as saved once it goes on: kilotwin control step 1"), std::string::npos)
+      << unsure.err;
+  const std::int64_t tick = latest().tick;
+  ASSERT_EQ(kilotwin({"control", "step", "1", "--domain", domain}, scratch_).status, 0);
+  EXPECT_TRUE(eventually([&] { return latest().saved_tick == tick; }));
+  ASSERT_EQ(kilotwin({"control", "stop", "--domain", domain}, scratch_).status, 0);
+  for (const auto& service : services) EXPECT_EQ(service->wait(30).status, 0);
+}
+
 TEST_F(Control, TheCommandSteersARun) {
   start();
   const std::string domain = std::to_string(domain_);
