@@ -57,6 +57,7 @@ BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared
       spin_up_(share_.size()),
       led_(share_.size()),
       life_cycle_(share_.size(), static_cast<std::uint8_t>(LifeCycle::kIdle)),
+      motor_share_(share_.size()),
       absent_(share_.size()),
       seen_led_(share_.size(), kUnknownLed),
       tx_period_(share_.size(), kInitialTxPeriod),
@@ -367,7 +368,7 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
     }
   }
   if (slot.surroundings()->eeprom_written != 0) keep_eeprom(i, slot);
-  note_outputs(i, robot, executor.tx_period());
+  note_outputs(i, robot, slot, executor.tx_period());
   // A flash within a tick is seen as often as it lasts. The end of the tick would always miss it, as callbacks run at its beginning.
   const KtSurroundings& around = *slot.surroundings();
   if (around.led_changes > 1 && around.led_changes <= KT_MOST_FLASHES) led_[i] = around.led_sampled & 63;
@@ -549,6 +550,7 @@ void BehavioursEngine::set_surroundings(std::uint32_t i, const Slot& slot, std::
   around.eeprom = eeprom_[i] ? eeprom_[i]->data() : nullptr;
   around.eeprom_filled = around.eeprom_written = 0;
   around.led_changes = 0;
+  around.motors.count = around.motors.from = 0;
 }
 
 void BehavioursEngine::keep_eeprom(std::uint32_t i, const Slot& slot) {
@@ -670,8 +672,8 @@ void BehavioursEngine::take_log(std::uint32_t i, const Slot& slot) {
   exchange.log_length = exchange.log_lost = 0;
 }
 
-/// Duties at the end of the tick, and how long both were full in it. A spin-up that goes on shows the duties before it.
-void BehavioursEngine::note_motors(std::uint32_t i, KtRobot& robot) {
+/// The duties to show for the tick, and how long both were full in it. A spin-up that goes on shows the duties before it.
+void BehavioursEngine::note_motors(std::uint32_t i, KtRobot& robot, KilotwinMotorPhases& phases) {
   const std::int64_t tick_cycles = plan_.tick_length.cycles();
   std::uint8_t left = robot.duty_left, right = robot.duty_right;
   std::int64_t full_cycles = robot.full_cycles;
@@ -691,14 +693,22 @@ void BehavioursEngine::note_motors(std::uint32_t i, KtRobot& robot) {
     }
   }
   robot.full_from = robot.full_cycles = 0;
+  if (phases.count != 0) {
+    phases.count = std::min(phases.count, KILOTWIN_MOTOR_PAIRS);  // the robot may have overwritten it
+    const auto since = static_cast<std::uint32_t>(std::max<std::int64_t>(tick_cycles - phases.from, 0));
+    kilotwin_add_motors(&phases, robot.duty_left, robot.duty_right, since);
+    const MotorShare::Pair shown = motor_share_[i].choose(phases);
+    left = shown.left;
+    right = shown.right;
+  }
   const bool on = robot.motors_on != 0;
   motor_left_[i] = on ? left : std::uint8_t{0};
   motor_right_[i] = on ? right : std::uint8_t{0};
   spin_up_[i] = on && full_cycles > 0 ? spin_up_of(full_cycles, tick_cycles) : std::uint8_t{0};
 }
 
-void BehavioursEngine::note_outputs(std::uint32_t i, KtRobot& robot, std::uint16_t tx_period) {
-  note_motors(i, robot);
+void BehavioursEngine::note_outputs(std::uint32_t i, KtRobot& robot, const Slot& slot, std::uint16_t tx_period) {
+  note_motors(i, robot, slot.surroundings()->motors);
   led_[i] = robot.led & 63;
   // A sleeping robot that has woken up to listen is idle for the radio.
   const bool listens = robot.state == static_cast<std::uint8_t>(LifeCycle::kSleeping) && robot.deaf == 0;

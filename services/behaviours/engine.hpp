@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/base/eeprom_layout.h"
+#include "core/base/motor_share.hpp"
 #include "core/frames/swarm_view.hpp"
 #include "core/model/radio_parameters.hpp"
 #include "core/model/robot_parameters.hpp"
@@ -142,8 +143,9 @@ class BehavioursEngine {
                                                       std::int32_t interrupted_cycles, Span&);
   [[gnu::always_inline]] inline Executor::Main run_loops(std::uint32_t i, const Executor&, std::int32_t cycles,
                                                          Span&);
-  [[gnu::always_inline]] inline void note_outputs(std::uint32_t i, KtRobot& robot, std::uint16_t tx_period);
-  [[gnu::always_inline]] inline void note_motors(std::uint32_t i, KtRobot& robot);
+  [[gnu::always_inline]] inline void note_outputs(std::uint32_t i, KtRobot& robot, const Slot&,
+                                                  std::uint16_t tx_period);
+  [[gnu::always_inline]] inline void note_motors(std::uint32_t i, KtRobot& robot, KilotwinMotorPhases&);
   [[nodiscard]] bool is_first(std::uint32_t i, Warning);
   void probe_loop(std::uint32_t i, const Program&, const Slot&, const Executor&);
   void note_overflows(std::uint32_t i, KtExchange&, const Program&, const Slot&);
@@ -180,6 +182,7 @@ class BehavioursEngine {
   std::vector<std::unique_ptr<Eeprom>> eeprom_;  ///< null: the default content, uid and motor calibration
   std::vector<Presence> presence_;
   std::vector<std::uint8_t> motor_left_, motor_right_, spin_up_, led_, life_cycle_;
+  std::vector<MotorShare> motor_share_;
   std::vector<std::uint8_t> absent_;    ///< 1: a tracked robot that is not there
   std::vector<std::uint8_t> seen_led_;  ///< of tracked robots, or kUnknownLed
   std::vector<std::uint16_t> tx_period_;

@@ -1,6 +1,7 @@
 /// Saves and loads a host's state per robot.
 #include <algorithm>
 #include <array>
+#include <cstring>
 
 #include "core/base/error.hpp"
 #include "idl/checkpoint.pb.h"
@@ -35,7 +36,8 @@ enum Field : std::size_t {
   kDue,
   kCrcErrorLow = kDue + 10,
   kCrcErrorHigh,
-  kFields
+  kMotorShare,
+  kFields = kMotorShare + sizeof(MotorShare)
 };
 
 }  // namespace
@@ -62,6 +64,7 @@ void BehavioursEngine::save(proto::BehavioursState& state) const {
     fields[kCrcErrorLow] = static_cast<std::uint8_t>(crc_error_[i] & 0xff);
     fields[kCrcErrorHigh] = static_cast<std::uint8_t>(crc_error_[i] >> 8);
     fields[kHolds] = holds_[i];
+    std::memcpy(&fields[kMotorShare], &motor_share_[i], sizeof(MotorShare));
     fields[kOffers] = offers_[i];
     std::copy(message_[i].begin(), message_[i].end(), fields.begin() + kMessage);
     robot.set_host(text(fields));
@@ -115,6 +118,7 @@ void BehavioursEngine::load(Tick tick, std::span<const proto::BehavioursState* c
     motor_left_[i] = fields[kLeft];
     motor_right_[i] = fields[kRight];
     spin_up_[i] = fields[kSpinUp];
+    std::memcpy(&motor_share_[i], &fields[kMotorShare], sizeof(MotorShare));
     led_[i] = fields[kLed];
     life_cycle_[i] = fields[kLifeCycle];
     tx_period_[i] = static_cast<std::uint16_t>(fields[kPeriodLow] | fields[kPeriodHigh] << 8);

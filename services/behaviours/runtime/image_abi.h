@@ -4,8 +4,10 @@
 
 #include <stdint.h>
 
+#include "core/base/motor_phases.h"
+
 #define KT_IMAGE_MAGIC 0x6e6977746f6c696bu /* "kilotwin" */
-#define KT_IMAGE_VERSION 9u
+#define KT_IMAGE_VERSION 10u
 /* Size of the buffer for text that a robot prints in one tick. A serial line of 38400 baud sends 126 octets per tick. */
 #define KT_LOG_OCTETS 3584
 /* Section of the heap. It is the last of a robot's memory, so that only its used part need be saved. */
@@ -149,6 +151,7 @@ struct KtSurroundings {
   uint8_t led_sampled;       /* after 1..KT_MOST_FLASHES changes: the LED at a random time of this tick */
   uint8_t unused[3];
   uint8_t eeprom_copy[1024];
+  struct KilotwinMotorPhases motors; /* no pairs and 0 on entry */
 };
 
 /* The entry point of the ELF file points to this table. Addresses are those of the slot. */
@@ -180,7 +183,7 @@ KT_ASSERT(sizeof(struct KtReception) == 16, "no padding");
 KT_ASSERT(sizeof(struct KtThread) == 48 && __builtin_offsetof(struct KtThread, budget) == KT_THREAD_BUDGET &&
               __builtin_offsetof(struct KtThread, held) == KT_THREAD_HELD,
           "no padding");
-KT_ASSERT(sizeof(struct KtSurroundings) == 1104, "no padding");
+KT_ASSERT(sizeof(struct KtSurroundings) == 1136, "no padding");
 KT_ASSERT(sizeof(struct KtImage) == 112, "no padding");
 
 #endif

@@ -181,13 +181,22 @@ void _delay_us(double us) { _delay_ms(us / 1000); }
 
 /* Cycles since the beginning of the tick. Callbacks run at its beginning. */
 static uint32_t cycle_of_tick(void) {
-  if (robot.loop_rate == KT_LOOP_PER_TICK) return (uint32_t)robot.debt_cycles;
   if (robot.in_interrupt) return 0;
+  if (robot.loop_rate == KT_LOOP_PER_TICK) return (uint32_t)robot.debt_cycles;
   const int32_t now = (int32_t)robot.tick_cycles - cycles_left() - cycles_held();
   return now > 0 ? (uint32_t)now : 0;
 }
 
 enum { FULL_DUTY = 255 };
+
+/* The duties are about to change. */
+static void note_duties(void) {
+  struct KilotwinMotorPhases* motors = &kt_surroundings->motors;
+  const uint32_t now = cycle_of_tick();
+  const uint32_t cycles = now > motors->from ? now - motors->from : 0;
+  kilotwin_add_motors(motors, robot.duty_left, robot.duty_right, cycles);
+  motors->from = now;
+}
 
 void set_motors(uint8_t left, uint8_t right) {
   charge(SET_MOTORS_CYCLES);
@@ -203,6 +212,7 @@ void set_motors(uint8_t left, uint8_t right) {
     }
     robot.full = full;
   }
+  if (left != robot.duty_left || right != robot.duty_right) note_duties();
   robot.duty_left = left;
   robot.duty_right = right;
 }

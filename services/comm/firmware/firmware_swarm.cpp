@@ -1,6 +1,7 @@
 #include "services/comm/firmware/firmware_swarm.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <map>
 
 #include "core/base/error.hpp"
@@ -143,6 +144,11 @@ void FirmwareSwarm::end_tick() {
     const Mcu::MotorUse use = robot.mcu->take_motors();
     robot.shown_left = use.left;
     robot.shown_right = use.right;
+    if (use.phases.count != 0) {
+      const MotorShare::Pair shown = robot.motor_share.choose(use.phases);
+      robot.shown_left = shown.left;
+      robot.shown_right = shown.right;
+    }
     const auto full_cycles = static_cast<std::int64_t>(use.full_cycles);
     robot.spin_up = full_cycles > 0 ? spin_up_of(full_cycles, cycles_per_tick_) : std::uint8_t{0};
   }
@@ -213,6 +219,7 @@ std::string FirmwareSwarm::save(std::uint32_t i) const {
   const Robot& robot = robots_[i];
   std::string board{robot.flat ? '\1' : '\0', static_cast<char>(robot.shown_left),
                     static_cast<char>(robot.shown_right), static_cast<char>(robot.spin_up)};
+  board.append(reinterpret_cast<const char*>(&robot.motor_share), sizeof(MotorShare));
   std::int64_t battery[2] = {0, 0};
   if (senses_.has_batteries()) battery[0] = senses_.charge(ids_[i]), battery[1] = senses_.drain(ids_[i]);
   for (const std::int64_t value : battery) {
@@ -222,7 +229,7 @@ std::string FirmwareSwarm::save(std::uint32_t i) const {
 }
 
 void FirmwareSwarm::load(std::uint32_t i, const std::string& octets) {
-  constexpr std::size_t kBoard = 4 + 2 * sizeof(std::int64_t);
+  constexpr std::size_t kBattery = 4 + sizeof(MotorShare), kBoard = kBattery + 2 * sizeof(std::int64_t);
   if (octets.size() < kBoard)
     throw RunError("a firmware robot is missing in the checkpoint; resume from another one");
   Robot& robot = robots_[i];
@@ -230,9 +237,10 @@ void FirmwareSwarm::load(std::uint32_t i, const std::string& octets) {
   robot.shown_left = static_cast<std::uint8_t>(octets[1]);
   robot.shown_right = static_cast<std::uint8_t>(octets[2]);
   robot.spin_up = static_cast<std::uint8_t>(octets[3]);
+  std::memcpy(&robot.motor_share, octets.data() + 4, sizeof(MotorShare));
   std::uint64_t battery[2] = {0, 0};
-  for (std::size_t n = 4; n < kBoard; ++n)
-    battery[(n - 4) / 8] |= std::uint64_t{static_cast<std::uint8_t>(octets[n])} << (n - 4) % 8 * 8;
+  for (std::size_t n = kBattery; n < kBoard; ++n)
+    battery[(n - kBattery) / 8] |= std::uint64_t{static_cast<std::uint8_t>(octets[n])} << (n - kBattery) % 8 * 8;
   if (senses_.has_batteries())
     senses_.restore(ids_[i], static_cast<std::int64_t>(battery[0]), static_cast<std::int64_t>(battery[1]));
   robot.mcu->load(octets.substr(kBoard));

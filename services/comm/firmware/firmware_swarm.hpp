@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/base/motor_share.hpp"
 #include "core/logs/robot_logs.hpp"
 #include "core/plan/plan.hpp"
 #include "services/comm/firmware/mcu.hpp"
@@ -54,7 +55,8 @@ class FirmwareSwarm final : public comm::FirmwareRobots {
     bool has_run = false;      ///< since the last commit
     std::uint8_t shown_left = 0, shown_right = 0;
     std::uint8_t spin_up = 0;  ///< core/base/spin_up.hpp
-    bool has_sent = false;     ///< in this tick
+    MotorShare motor_share;
+    bool has_sent = false;  ///< in this tick
     bool flat = false;
     std::vector<Light> light;
   };

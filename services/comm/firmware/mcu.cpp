@@ -403,6 +403,7 @@ void Mcu::note_motors() {
   if (at - s.changed_at > kBothWritten) {
     s.steady_left = s.left;
     s.steady_right = s.right;
+    add_phase();
   }
   s.changed_at = at;
   s.left = out.motor_left;
@@ -418,10 +419,19 @@ void Mcu::note_motors() {
   }
 }
 
+/// Counts the duties since their last change, or since the last call of take_motors().
+void Mcu::add_phase() {
+  State& s = state_;
+  kilotwin_add_motors(&s.phases, s.left, s.right,
+                      static_cast<std::uint32_t>(now() - std::max(s.changed_at, s.motors_from)));
+}
+
 Mcu::MotorUse Mcu::take_motors() {
   note_motors();
   State& s = state_;
-  MotorUse use{s.full_cycles, s.left, s.right};
+  if (s.phases.count != 0) add_phase();
+  MotorUse use{s.full_cycles, s.left, s.right, s.phases};
+  s.phases = {};
   if (s.full_since != kNever) {
     use.full_cycles += now() - std::max(s.full_since, s.motors_from);
     if (s.full_since > s.motors_from) {

@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/motor_phases.h"
 #include "core/random/random.hpp"
 #include "core/senses/robot_senses.hpp"
 #include "services/comm/firmware/fast_core.hpp"
@@ -77,11 +78,12 @@ class Mcu {
   [[nodiscard]] std::string& printed() { return printed_; }
 
   [[nodiscard]] Outputs outputs() const;
-  /// The motors since the last call, and the duties to show: where full duty of both motors goes on and is younger than the last
-  /// call, those before it.
+  /// The motors since the last call, and the duties at the end: where full duty of both motors goes on and is younger than the
+  /// last call, those before it.
   struct MotorUse {
     OwnCycles full_cycles = 0;  ///< for how long both motors had full duty
     std::uint8_t left = 0, right = 0;
+    KilotwinMotorPhases phases{};  ///< of the time without full duty of both; empty: the duties did not change
   };
   [[nodiscard]] MotorUse take_motors();
   [[nodiscard]] Halt halt() const { return state_.halt; }
@@ -118,6 +120,7 @@ class Mcu {
     // takes to write both.
     OwnCycles motors_from = 0, full_since = kNever, full_cycles = 0, changed_at = 0;
     std::uint8_t left = 0, right = 0, steady_left = 0, steady_right = 0, before_left = 0, before_right = 0;
+    KilotwinMotorPhases phases{};  ///< since motors_from; empty whenever the state is saved
   };
   /// A range of memory that changes while the processor runs.
   struct Range {
@@ -145,6 +148,7 @@ class Mcu {
   [[nodiscard]] std::vector<Range> ranges() const;
 
   void note_motors();
+  void add_phase();
   static void on_motor(avr_irq_t*, std::uint32_t value, void* mcu);
   static void on_led(avr_irq_t*, std::uint32_t value, void* mcu);
   static void on_conversion(avr_irq_t*, std::uint32_t, void* mcu);

@@ -68,9 +68,9 @@ TEST(Engine, SeveralProgramsRunSideBySide) {
 TEST(Engine, DelayTakesItsTimeWhileMessagesArrive) {
   // 100 ms = 800000 cycles = 3.05 ticks. A wait is over in the tick into which its end falls; the rest adds up.
   Swarm swarm({program("static uint8_t heard, rounds;\n"
-                       "static void rx(message_t* m, distance_measurement_t* d) { set_motors(++heard, rounds); }\n"
+                       "static void rx(message_t* m, distance_measurement_t* d) { set_motors(++heard, 0); }\n"
                        "static message_t m; static message_t* tx(void) { m.data[0] = kilo_ticks; return &m; }\n"
-                       "static void loop(void) { delay(100); ++rounds; set_motors(heard, rounds); }")},
+                       "static void loop(void) { delay(100); set_color(++rounds); }")},
               1);
   swarm.start();
   for (int k = 1; k <= 610; ++k) {
@@ -79,7 +79,7 @@ TEST(Engine, DelayTakesItsTimeWhileMessagesArrive) {
     swarm.step(air);
     const ActuationFrame frame = swarm.frame();
     EXPECT_EQ(frame.motor_left[0], k % 256);
-    EXPECT_EQ(frame.motor_right[0], ((k + 1) * 262144 - 1) / 800000 % 256) << k;
+    EXPECT_EQ(frame.led[0], ((k + 1) * 262144 - 1) / 800000 % 64) << k;
     if (k == 2) {
       EXPECT_EQ(frame.offer_message.at(0)[0], 3);  // kilo_ticks went on as well
     }

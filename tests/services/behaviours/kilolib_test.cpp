@@ -98,6 +98,23 @@ TEST(Kilolib, ASpinUpThatGoesOnShowsTheDutiesBeforeIt) {
   EXPECT_EQ(frame.motor_left[0], 0);
 }
 
+TEST(Kilolib, DutiesWithinATickAreShownAsLongAsTheyHold) {
+  // Each tick begins with the left motor and ends with both at rest.
+  Swarm swarm({program("static void loop(void) { uint32_t t = kilo_ticks; set_motors(70, 0); delay(10); "
+                       "set_motors(0, 0); while (kilo_ticks == t); }\n")},
+              1, 1, "", [](proto::Manifest& manifest) {
+                manifest.mutable_experiment()->mutable_robots(0)->clear_loop_rate();
+              });
+  swarm.start();
+  constexpr int kTicks = 600;
+  int shown = 0;
+  for (int k = 0; k < kTicks; ++k) {
+    swarm.step();
+    shown += swarm.frame().motor_left[0] == 70 ? 1 : 0;
+  }
+  EXPECT_NEAR(shown, kTicks * 10 / 32.768, 3);
+}
+
 TEST(Kilolib, ReceivedMessagesCarryTheirChecksum) {
   Swarm swarm(
       {program("static void rx(message_t* m, distance_measurement_t* d) {\n"

@@ -161,5 +161,33 @@ TEST(LoopRate, PrintedTextIsNotSkipped) {
   EXPECT_GE(octets, 20u);
 }
 
+/// What a swarm of two robots with this loop() is warned of within ten seconds.
+std::vector<std::string> warned(const std::string& loop, bool as_on_robot) {
+  Swarm swarm({program("static uint32_t n;\nstatic void loop(void) { " + loop + " }\n")}, 2, 1, "",
+              [&](proto::Manifest& manifest) {
+                if (as_on_robot) manifest.mutable_experiment()->mutable_robots(0)->clear_loop_rate();
+              });
+  swarm.start();
+  swarm.steps(310);
+  std::vector<std::string> texts;
+  for (const auto& warning : swarm.hosts[0]->warnings()) texts.push_back(warning.text);
+  return texts;
+}
+
+TEST(LoopRate, ProgramsThatAreSlowToSimulateAreNamedOnce) {
+  const std::vector<std::string> counts = warned("++n;", true);
+  ASSERT_EQ(counts.size(), 1u);
+  EXPECT_NE(counts[0].find("so each is simulated, more than "), std::string::npos) << counts[0];
+  EXPECT_EQ(warned("n = kilo_ticks;", true), std::vector<std::string>{});
+  EXPECT_EQ(warned("++n; delay(1);", true), std::vector<std::string>{}) << "its calls take time";
+}
+
+TEST(LoopRate, ProgramsWhoseNumberOfCallsMattersAreNamedOnce) {
+  const std::vector<std::string> counts = warned("++n;", false);
+  ASSERT_EQ(counts.size(), 1u);
+  EXPECT_NE(counts[0].find("times per tick, here once"), std::string::npos) << counts[0];
+  EXPECT_EQ(warned("n = kilo_ticks;", false), std::vector<std::string>{});
+}
+
 }  // namespace
 }  // namespace kilotwin::behaviours::test

@@ -114,6 +114,40 @@ TEST_F(FirmwareRun, MovesWhenANativeRobotDoes) {
 
 /// kilo_ticks has four octets, and the robot's processor reads them one by one. If the clock's interrupt comes in between while the
 /// lowest carries over, the program sees a time up to 255 ticks ahead.
+/// Programs that set their motors several times in a tick, and the part of the speed straight on that they reach.
+struct Pulses {
+  const char* loop;
+  double part;
+};
+
+TEST_F(FirmwareRun, MovesAsFarWhereMotorsChangeWithinATick) {
+  constexpr double kTick_ms = 32.768, kSpinUp = 1.5;  // full duty: the model's top_speed_ratio
+  const Pulses all[] = {
+      // Once per tick, at the same place of it: what the tick ends with is not what it was.
+      {"uint32_t t = kilo_ticks; set_motors(kilo_straight_left, kilo_straight_right); delay(10); set_motors(0, "
+       "0);\n"
+       "while (kilo_ticks == t);",
+       10 / kTick_ms},
+      {"set_motors(kilo_straight_left, kilo_straight_right); delay(6); set_motors(0, 0); delay(6);", 0.5},
+      {"spinup_motors(); set_motors(kilo_straight_left, kilo_straight_right); delay(40);",
+       (15 * kSpinUp + 40) / 55.0},
+      {"spinup_motors(); set_motors(0, 0); delay(5);", 15 * kSpinUp / 20},
+  };
+  for (const Pulses& one : all) {
+    const std::string source = program(
+        "pulses.c",
+        whole_program("static void setup(void) {}\nstatic void loop(void) { " + std::string(one.loop) + " }\n"));
+    const auto path_mm = [&](const std::string& kind) {
+      return run("duration_s: 30 seed: 3 motion { noise: false } radio { oscillator_sd: 0 }\nrobots { count: 1 " +
+                 source + kind + " layout { grid {} } }\n")
+          .path_mm[0];
+    };
+    const double native_mm = path_mm(""), firmware_mm = path_mm("avr: true");
+    EXPECT_NEAR(native_mm, firmware_mm, 0.02 * firmware_mm) << one.loop;
+    EXPECT_NEAR(native_mm, 10 * one.part * 30, 0.03 * native_mm) << one.loop;
+  }
+}
+
 TEST_F(FirmwareRun, DiffersFirstWhereTheClockCarriesOver) {
   const std::string walk = "behaviour: \"" KILOTWIN_SOURCE_DIR "/behaviours/walk.c\" ";
   int early = 0;

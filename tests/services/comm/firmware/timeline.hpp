@@ -1,6 +1,7 @@
 /// Changes of robots' outputs over a run, to compare runs of the same source as native program and as firmware.
 #pragma once
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -21,6 +22,7 @@ struct Change {
 
 struct Timeline {
   std::vector<std::vector<Change>> motors, led;  ///< per robot
+  std::vector<double> path_mm;                   ///< per robot
   RunTotals totals;
 };
 
@@ -29,6 +31,7 @@ class TimelineObserver : public RunObserver {
   explicit TimelineObserver(std::uint32_t robots) {
     timeline.motors.resize(robots);
     timeline.led.resize(robots);
+    timeline.path_mm.resize(robots);
   }
   void state(Tick tick, const SwarmView& swarm, bool) override {
     for (std::uint32_t robot = 0; robot < swarm.robots(); ++robot) {
@@ -37,7 +40,11 @@ class TimelineObserver : public RunObserver {
       if (!kick)
         note(timeline.motors[robot], tick, std::uint32_t{swarm.motor_left[robot]} << 8 | swarm.motor_right[robot]);
       note(timeline.led[robot], tick, swarm.led[robot]);
+      if (!x_mm_.empty())
+        timeline.path_mm[robot] += std::hypot(swarm.x_mm[robot] - x_mm_[robot], swarm.y_mm[robot] - y_mm_[robot]);
     }
+    x_mm_ = swarm.x_mm;
+    y_mm_ = swarm.y_mm;
   }
   void hash(Tick, std::uint64_t) override {}
   void input(const Directive&) override {}
@@ -48,6 +55,8 @@ class TimelineObserver : public RunObserver {
   static void note(std::vector<Change>& changes, Tick tick, std::uint32_t value) {
     if (value != (changes.empty() ? 0 : changes.back().value)) changes.push_back({tick.count(), value});
   }
+
+  std::vector<double> x_mm_, y_mm_;  // of the last tick
 };
 
 /// Runs an experiment locally. `folder`: directory for the experiment and its run; `inputs`: external ones.
