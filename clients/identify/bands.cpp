@@ -1,20 +1,22 @@
 #include "clients/identify/bands.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "core/stats/distributions.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
-using nlohmann::json;
 using Shape = Factor::Shape;
 
 /// A value at which a band is given, and a situation with it.
 struct Place {
-  json at;
+  JsonValue at;
   Situation situation;
 };
 
@@ -68,7 +70,8 @@ std::vector<Place> places_of_curve(const Factor& factor) {
   }
   std::vector<Place> places;
   for (const double value : at)
-    if (const std::optional<Situation> s = situation_at(factor.axis, value)) places.push_back({value, *s});
+    if (const std::optional<Situation> s = situation_at(factor.axis, value))
+      places.push_back({json_value(value), *s});
   return places;
 }
 
@@ -80,14 +83,14 @@ std::vector<Place> places_of_map(const Factor& factor) {
       Situation s;
       s.x_mm = factor.low + (factor.high - factor.low) * i / (kAcross - 1);
       s.y_mm = factor.and_low + (factor.and_high - factor.and_low) * j / (kAcross - 1);
-      places.push_back({json::array({s.x_mm, s.y_mm}), s});
+      places.push_back({json_value(json_list(std::array{s.x_mm, s.y_mm})), s});
     }
   }
   return places;
 }
 
 std::vector<Place> places_of(const Basis& basis) {
-  if (basis.factors.empty()) return {{json(), Situation{}}};
+  if (basis.factors.empty()) return {{json_null(), Situation{}}};
   const Factor& factor = basis.factors.front();
   // The one coefficient of a grid scales a map whose values are fixed: its error says nothing about them.
   if (basis.factors.size() > 1 || factor.shape == Shape::kTravelling || factor.shape == Shape::kGrid) return {};
@@ -98,21 +101,24 @@ std::vector<Place> places_of(const Basis& basis) {
 
 }  // namespace
 
-json bands_of(const MotionModel& model, std::size_t term, const Uncertainty& uncertainty) {
-  constexpr double kNormal95 = 1.96;
-  json bands = json::array();
+JsonList bands_of(const MotionModel& model, std::size_t term, const Uncertainty& uncertainty) {
+  JsonList bands;
   for (std::size_t b = 0; b < model.terms[term].blocks.size(); ++b) {
-    json band;
+    JsonList at, value, low, high;
     for (const Place& place : places_of(model.terms[term].blocks[b].basis)) {
       const ValueWithSd v = value_of(model, term, b, place.situation, uncertainty.covariance);
-      band["at"].push_back(place.at);
-      band["value"].push_back(v.value);
-      band["low"].push_back(v.value - kNormal95 * v.sd);
-      band["high"].push_back(v.value + kNormal95 * v.sd);
+      *at.add_values() = place.at;
+      *value.add_values() = json_value(v.value);
+      *low.add_values() = json_value(v.value - stats::kNormal95 * v.sd);
+      *high.add_values() = json_value(v.value + stats::kNormal95 * v.sd);
     }
-    if (band.empty()) continue;
-    band["block"] = b + 1;
-    bands.push_back(std::move(band));
+    if (at.values().empty()) continue;
+    auto& band = *bands.add_values()->mutable_struct_value()->mutable_fields();
+    band["block"] = json_value(b + 1);
+    band["at"] = json_value(std::move(at));
+    band["value"] = json_value(std::move(value));
+    band["low"] = json_value(std::move(low));
+    band["high"] = json_value(std::move(high));
   }
   return bands;
 }

@@ -1,15 +1,14 @@
 /// 95 % bands of the curves and maps of a fitted model.
 #pragma once
 
-#include <nlohmann/json.hpp>
-
 #include "clients/identify/fit/uncertainty.hpp"
+#include "clients/identify/result/values.hpp"
 
 namespace kilotwin::identify {
 
 /// One entry per block of a term that depends on one covariate, on position, or on nothing: `block` (from 1), `value`, `low`
 /// and `high` at each place of `at`. Values have the unit of the block's target; places that of the covariate. Blocks that
 /// depend on the other robots' paths or on a product of covariates have none, nor have maps with edges.
-[[nodiscard]] nlohmann::json bands_of(const MotionModel&, std::size_t term, const Uncertainty&);
+[[nodiscard]] JsonList bands_of(const MotionModel&, std::size_t term, const Uncertainty&);
 
 }  // namespace kilotwin::identify

@@ -9,39 +9,41 @@
 #include <map>
 
 #include "clients/identify/bands.hpp"
-#include "clients/identify/fit/residuals.hpp"
 #include "clients/identify/model/effect_records.hpp"
 #include "clients/identify/model/effect_text.hpp"
 #include "clients/identify/predict/final_check.hpp"
+#include "clients/identify/residual_plots.hpp"
+#include "clients/identify/result/values.hpp"
 
 namespace kilotwin::identify {
 namespace {
 
-using nlohmann::json;
-
 /// Root mean square error, with its 95 % interval if known; null if nothing is held out.
-json summary_of(const PredictionErrors& errors, const std::optional<ErrorBounds>& bounds,
-                Interval ErrorBounds::*which) {
-  json out = {{"rmse_mm", errors.rows > 0 ? json(errors.rmse_mm()) : json()}, {"rows", errors.rows}};
+identification::Accuracy accuracy_of(const PredictionErrors& errors, const std::optional<ErrorBounds>& bounds,
+                                     Interval ErrorBounds::*which) {
+  identification::Accuracy out;
+  *out.mutable_rmse_mm() = errors.rows > 0 ? json_value(errors.rmse_mm()) : json_null();
+  out.set_rows(static_cast<std::uint32_t>(errors.rows));
   if (bounds) {
-    out["rmse_low_mm"] = ((*bounds).*which).low_mm;
-    out["rmse_high_mm"] = ((*bounds).*which).high_mm;
+    out.set_rmse_low_mm(((*bounds).*which).low_mm);
+    out.set_rmse_high_mm(((*bounds).*which).high_mm);
   }
   return out;
 }
 
 /// Reduction of the error.
-json improvement_of(const PredictionErrors& before, const PredictionErrors& after,
-                    const std::optional<ErrorBounds>& bounds) {
-  if (before.rows == 0) return json::object();
-  json out = {{"less_by_mm", before.rmse_mm() - after.rmse_mm()}};
+identification::Improvement improvement_of(const PredictionErrors& before, const PredictionErrors& after,
+                                           const std::optional<ErrorBounds>& bounds) {
+  identification::Improvement out;
+  if (before.rows == 0) return out;
+  out.set_less_by_mm(before.rmse_mm() - after.rmse_mm());
   if (bounds) {
-    out["low_mm"] = bounds->less_by.low_mm;
-    out["high_mm"] = bounds->less_by.high_mm;
-    out["bounds_how"] =
+    out.set_low_mm(bounds->less_by.low_mm);
+    out.set_high_mm(bounds->less_by.high_mm);
+    out.set_bounds_how(
         fmt::format("95 %, by a bootstrap over {}{}", bounds->runs > 1 ? "robots and runs" : "robots",
                     bounds->runs > 1 ? fmt::format(", {} robots and {} runs", bounds->robots, bounds->runs)
-                                     : fmt::format(": {} robots in one run", bounds->robots));
+                                     : fmt::format(": {} robots in one run", bounds->robots)));
   }
   return out;
 }
@@ -109,79 +111,88 @@ double share_removed(const Findings& f, double without_mm) {
   return std::clamp((without_mm * without_mm - after_mm * after_mm) / gap, 0.0, 1.0);
 }
 
-json effect_of(const Findings& f, std::size_t t) {
+identification::Evidence evidence_of(const Findings& f, std::size_t t) {
+  const Reason& reason = f.found.reasons[t];
+  identification::Evidence out;
+  out.set_log10_p(reason.finding.log10_p);
+  out.set_threshold_log10_p(reason.threshold_log10_p);
+  out.set_p_family(
+      std::min(1.0, ScoreTest::kFamilyAlarm *
+                        std::pow(10.0, std::max(-300.0, reason.finding.log10_p - reason.threshold_log10_p))));
+  out.set_log_likelihood_gain(reason.finding.evidence);
+  const bool chosen = !f.check.gains.empty();
+  *out.mutable_held_out_gain() = chosen ? json_value(f.check.gains[t].nat) : json_null();
+  *out.mutable_held_out_gain_se() = chosen ? json_value(f.check.gains[t].nat_se) : json_null();
+  out.set_degrees(static_cast<std::uint32_t>(reason.finding.degrees));
+  return out;
+}
+
+identification::Effect effect_of(const Findings& f, std::size_t t) {
   const Term& term = f.found.fit.model.terms[t];
   const Reason& reason = f.found.reasons[t];
   const std::vector<proto::Effect> written = effects_of_term(term);
-  json records = json::array();
+  std::vector<std::string> records, covariates;
   for (const proto::Effect& effect : written) records.push_back(effect.ShortDebugString());
-  const std::string size = size_in_words(written);
-  std::vector<std::string> covariates;
   for (const std::string& covariate : reason.covariates) covariates.push_back(in_words(covariate));
-  const bool judged = !f.rmse_without_mm.empty(), chosen = !f.check.gains.empty();
-  const HeldOutGain gain = chosen ? f.check.gains[t] : HeldOutGain{};
-  return {
-      {"name", term.name},
-      {"covariates", reason.covariates},
-      {"acts_on", reason.acts_on},
-      {"evidence",
-       {{"log10_p", reason.finding.log10_p},
-        {"threshold_log10_p", reason.threshold_log10_p},
-        {"p_family",
-         std::min(1.0, ScoreTest::kFamilyAlarm *
-                           std::pow(10.0, std::max(-300.0, reason.finding.log10_p - reason.threshold_log10_p)))},
-        {"log_likelihood_gain", reason.finding.evidence},
-        {"held_out_gain", chosen ? json(gain.nat) : json()},
-        {"held_out_gain_se", chosen ? json(gain.nat_se) : json()},
-        {"degrees", reason.finding.degrees}}},
-      {"parameters",
-       {{"form", form_of(term)},
-        {"columns", term.coefficients.size()},
-        {"records", records},
-        {"bands_95", bands_of(f.found.fit.model, t, f.uncertainty)}}},
-      {"rmse_without_mm", judged ? json(f.rmse_without_mm[t]) : json()},
-      {"share_removed", judged ? json(share_removed(f, f.rmse_without_mm[t])) : json()},
-      {"in_words", fmt::format("{} depends on {}{}{}", reason.acts_on, fmt::join(covariates, ", "),
-                               size.empty() ? "" : ": ", size)}};
+  identification::Effect out;
+  out.set_name(term.name);
+  assign(out.mutable_covariates(), reason.covariates);
+  out.set_acts_on(reason.acts_on);
+  *out.mutable_evidence() = evidence_of(f, t);
+  auto& parameters = *out.mutable_parameters()->mutable_fields();
+  parameters["form"] = json_value(form_of(term));
+  parameters["columns"] = json_value(term.coefficients.size());
+  parameters["records"] = json_value(json_list(records));
+  parameters["bands_95"] = json_value(bands_of(f.found.fit.model, t, f.uncertainty));
+  const bool judged = !f.rmse_without_mm.empty();
+  *out.mutable_rmse_without_mm() = judged ? json_value(f.rmse_without_mm[t]) : json_null();
+  *out.mutable_share_removed() = judged ? json_value(share_removed(f, f.rmse_without_mm[t])) : json_null();
+  const std::string size = size_in_words(written);
+  out.set_in_words(fmt::format("{} depends on {}{}{}", reason.acts_on, fmt::join(covariates, ", "),
+                               size.empty() ? "" : ": ", size));
+  return out;
 }
 
+using Effects = google::protobuf::RepeatedPtrField<identification::Effect>;
+
 /// Takes the shares of the effects out if they do not add up, as with effects that overlap.
-void keep_shares_that_add_up(json& effects) {
+void keep_shares_that_add_up(Effects& effects) {
   double sum = 0;
-  for (const json& effect : effects)
-    if (effect["share_removed"].is_number()) sum += effect["share_removed"].get<double>();
+  for (const identification::Effect& effect : effects) sum += effect.share_removed().number_value();
   constexpr double kOff = 0.1;
   if (effects.size() < 2 || std::abs(sum - 1) < kOff) return;
-  for (json& effect : effects) effect["share_removed"] = nullptr;
+  for (identification::Effect& effect : effects) *effect.mutable_share_removed() = json_null();
 }
 
 /// One entry per effect. Terms of one name share an entry, with the largest loss among them.
-json effects_of(const Findings& f) {
-  json effects = json::array();
+Effects effects_of(const Findings& f) {
+  Effects effects;
   for (std::size_t t = 0; t < f.found.fit.model.terms.size(); ++t) {
-    json effect = effect_of(f, t);
-    const auto known =
-        std::find_if(effects.begin(), effects.end(), [&](const json& e) { return e["name"] == effect["name"]; });
+    identification::Effect effect = effect_of(f, t);
+    const auto known = std::find_if(effects.begin(), effects.end(),
+                                    [&](const identification::Effect& e) { return e.name() == effect.name(); });
     if (known == effects.end()) {
-      effects.push_back(std::move(effect));
+      *effects.Add() = std::move(effect);
       continue;
     }
     if (f.rmse_without_mm.empty()) continue;
-    if ((*known)["rmse_without_mm"] < effect["rmse_without_mm"])
-      (*known)["rmse_without_mm"] = effect["rmse_without_mm"];
-    json &evidence = (*known)["evidence"], &other = effect["evidence"];
-    if (evidence["held_out_gain"] < other["held_out_gain"]) {
-      for (const char* key : {"held_out_gain", "held_out_gain_se"}) evidence[key] = other[key];
+    if (known->rmse_without_mm().number_value() < effect.rmse_without_mm().number_value())
+      *known->mutable_rmse_without_mm() = effect.rmse_without_mm();
+    const identification::Evidence& other = effect.evidence();
+    if (known->evidence().held_out_gain().number_value() < other.held_out_gain().number_value()) {
+      *known->mutable_evidence()->mutable_held_out_gain() = other.held_out_gain();
+      *known->mutable_evidence()->mutable_held_out_gain_se() = other.held_out_gain_se();
     }
   }
   keep_shares_that_add_up(effects);
-  std::stable_sort(effects.begin(), effects.end(), [](const json& a, const json& b) {
-    return a["evidence"]["log_likelihood_gain"].get<double>() > b["evidence"]["log_likelihood_gain"].get<double>();
-  });
+  std::stable_sort(effects.begin(), effects.end(),
+                   [](const identification::Effect& a, const identification::Effect& b) {
+                     return a.evidence().log_likelihood_gain() > b.evidence().log_likelihood_gain();
+                   });
   return effects;
 }
 
-json describe_set(const MeasuredSet& train, const MeasuredSet* test, HeldOut held_out) {
+identification::DataSet describe_set(const MeasuredSet& train, const MeasuredSet* test, HeldOut held_out) {
   double duration_s = 0;
   std::vector<double> steps;
   for (const Run& run : train.runs) {
@@ -192,70 +203,80 @@ json describe_set(const MeasuredSet& train, const MeasuredSet* test, HeldOut hel
     }
   }
   std::sort(steps.begin(), steps.end());
-  return {{"runs", train.runs.size()},
-          {"robots", train.robots().size()},
-          {"tracks", train.tracks()},
-          {"samples", train.samples()},
-          {"test_samples", test != nullptr ? test->samples() : 0},
-          {"has_headings", train.has_headings},
-          {"has_commands", train.has_commands},
-          {"duration_s", duration_s},
-          {"sample_s", steps.empty() ? 0 : steps[steps.size() / 2]},
-          {"held_out", name_of(held_out)}};
-}
-
-json rejected_of(const Search& found) {
-  json out = json::array();
-  for (const Rejected& r : found.rejected) {
-    out.push_back({{"name", r.name},
-                   {"covariates", r.covariates},
-                   {"acts_on", r.acts_on},
-                   {"log10_p", r.log10_p},
-                   {"threshold_log10_p", r.threshold_log10_p}});
-    if (!r.why.empty()) out.back()["why"] = r.why;
-  }
+  const auto count = [](std::size_t n) { return static_cast<std::uint32_t>(n); };
+  identification::DataSet out;
+  out.set_runs(count(train.runs.size()));
+  out.set_robots(count(train.robots().size()));
+  out.set_tracks(count(train.tracks()));
+  out.set_samples(count(train.samples()));
+  out.set_test_samples(test != nullptr ? count(test->samples()) : 0);
+  out.set_has_headings(train.has_headings);
+  out.set_has_commands(train.has_commands);
+  out.set_duration_s(duration_s);
+  out.set_sample_interval_s(steps.empty() ? 0 : steps[steps.size() / 2]);
+  out.set_held_out(name_of(held_out));
   return out;
 }
 
-json ambiguous_of(const Search& found) {
-  json out = json::array();
-  for (const Ambiguity& a : found.ambiguous) {
-    out.push_back({{"found", a.found},
-                   {"instead", a.instead},
-                   {"experiment", experiment_for(a.found_covariates, a.covariates)},
-                   {"log_likelihood_difference", a.evidence_difference}});
-  }
+identification::Rejected rejected_of(const Rejected& r) {
+  identification::Rejected out;
+  out.set_name(r.name);
+  assign(out.mutable_covariates(), r.covariates);
+  out.set_acts_on(r.acts_on);
+  out.set_log10_p(r.log10_p);
+  out.set_threshold_log10_p(r.threshold_log10_p);
+  if (!r.why.empty()) out.set_why(r.why);
   return out;
 }
 
-json base_of(const BaseParameters& base) {
-  return {{"straight_speed_mm_s", base.straight_mm_s}, {"turn_speed_mm_s", base.turn_mm_s},
-          {"wheel_base_mm", base.wheel_base_mm},       {"tracked_point_ahead_mm", base.ahead_mm},
-          {"tracked_point_left_mm", base.left_mm},     {"disc_centre_ahead_mm", base.centre_mm},
-          {"bias_mean_mm_s", base.bias_mean_mm_s},     {"bias_sd_mm_s", base.bias_sd_mm_s},
-          {"command_lag_s", base.command_lag_s}};
+identification::Ambiguous ambiguous_of(const Ambiguity& a) {
+  identification::Ambiguous out;
+  out.set_found(a.found);
+  out.set_instead(a.instead);
+  out.set_experiment(experiment_for(a.found_covariates, a.covariates));
+  out.set_log_likelihood_difference(a.evidence_difference);
+  return out;
 }
 
-json numbering_of(const Numbering& numbering) {
-  json out = {{"anew_in_each_run", numbering.anew()}, {"spread", numbering.spread}, {"chance", numbering.chance}};
-  if (numbering.anew())
-    out["in_words"] =
-        "Robots seem to be numbered anew in each run: they differ in speed, but a number does not have the same "
-        "speed in all runs.";
+identification::Base base_of(const BaseParameters& base) {
+  identification::Base out;
+  out.set_straight_speed_mm_s(base.straight_mm_s);
+  out.set_turn_speed_mm_s(base.turn_mm_s);
+  out.set_wheel_base_mm(base.wheel_base_mm);
+  out.set_tracked_point_ahead_mm(base.ahead_mm);
+  out.set_tracked_point_left_mm(base.left_mm);
+  out.set_disc_centre_ahead_mm(base.centre_mm);
+  out.set_bias_mean_mm_s(base.bias_mean_mm_s);
+  out.set_bias_sd_mm_s(base.bias_sd_mm_s);
+  out.set_command_lag_s(base.command_lag_s);
   return out;
 }
 
 /// Standard deviations of the base parameters.
-json base_sd_of(const Uncertainty& u) {
-  return {{"straight_speed_mm_s", u.sd(kStraightSpeed)},
-          {"turn_speed_mm_s", u.sd(kTurnSpeed)},
-          {"wheel_base_mm", u.sd(kWheelBase)},
-          {"tracked_point_ahead_mm", u.sd(kAheadPoint)},
-          {"tracked_point_left_mm", u.sd(kLeftPoint)}};
+identification::Base base_sd_of(const Uncertainty& u) {
+  identification::Base out;
+  out.set_straight_speed_mm_s(u.sd(kStraightSpeed));
+  out.set_turn_speed_mm_s(u.sd(kTurnSpeed));
+  out.set_wheel_base_mm(u.sd(kWheelBase));
+  out.set_tracked_point_ahead_mm(u.sd(kAheadPoint));
+  out.set_tracked_point_left_mm(u.sd(kLeftPoint));
+  return out;
+}
+
+identification::Numbering entry_of(const Numbering& numbering) {
+  identification::Numbering out;
+  out.set_anew_in_each_run(numbering.anew());
+  out.set_spread(numbering.spread);
+  out.set_chance(numbering.chance);
+  if (numbering.anew())
+    out.set_in_words(
+        "Robots seem to be numbered anew in each run: they differ in speed, but a number does not have the same "
+        "speed in all runs.");
+  return out;
 }
 
 /// Where contacts and walls act, and what the data say about it.
-json disc_centre_of(const MotionModel& model) {
+identification::DiscCentre disc_centre_of(const MotionModel& model) {
   constexpr double kSame_mm = 3, kTold = 3;
   const bool tracked = std::abs(model.base.centre_mm - model.base.ahead_mm) < kSame_mm;
   const std::string where =
@@ -266,42 +287,36 @@ json disc_centre_of(const MotionModel& model) {
                           : evidence > kTold
                               ? fmt::format("told by contacts, by {:.0f} nat of log likelihood", evidence)
                               : std::string("told by how near robots come to each other");
-  return {{"ahead_mm", model.base.centre_mm},
-          {"at_tracked_point", tracked},
-          {"log_likelihood_over_alternative", evidence},
-          {"in_words", fmt::format("Contacts and walls act {} ({}).", where, why)}};
-}
-
-json noise_of(const Noise& noise) {
-  return {{"factor_variance_s", noise.factor_s},
-          {"wheel_sd_mm", std::sqrt(noise.wheel_mm2_s)},
-          {"heading_sd_rad", std::sqrt(noise.heading_rad2_s)},
-          {"drift_sd_mm", std::sqrt(noise.drift_mm2_s)},
-          {"tracker_position_sd_mm", std::sqrt(noise.position_mm2)},
-          {"tracker_heading_sd_rad", std::sqrt(noise.heading_rad2)},
-          {"at_walls_sd_mm", std::sqrt(noise.wall_mm2_s)},
-          {"at_walls_sd_rad", std::sqrt(noise.wall_rad2_s)},
-          {"at_robots_sd_mm", std::sqrt(noise.contact_mm2_s)},
-          {"at_robots_sd_rad", std::sqrt(noise.contact_rad2_s)}};
-}
-
-/// Lines that disc centres do not cross. A side without an entry has no wall.
-json walls_of(const Walls& walls) {
-  json out = json::object();
-  for (const auto& [side, at_mm] : {std::pair{"x_low_mm", walls.x_low_mm},
-                                    {"x_high_mm", walls.x_high_mm},
-                                    {"y_low_mm", walls.y_low_mm},
-                                    {"y_high_mm", walls.y_high_mm}}) {
-    if (std::isfinite(at_mm)) out[side] = at_mm;
-  }
+  identification::DiscCentre out;
+  out.set_ahead_mm(model.base.centre_mm);
+  out.set_at_tracked_point(tracked);
+  out.set_log_likelihood_over_alternative(evidence);
+  out.set_in_words(fmt::format("Contacts and walls act {} ({}).", where, why));
   return out;
 }
 
-json check_of(const FinalCheck& check) {
-  json path = json::array();
-  for (const CheckedModel& model : check.path)
-    path.push_back({{"effects", model.effects}, {"rmse_mm", model.rmse_mm}});
-  return {{"path", path}, {"kept", check.kept}, {"dropped", check.dropped}};
+identification::Noise noise_of(const Noise& noise) {
+  identification::Noise out;
+  out.set_factor_variance_s(noise.factor_s);
+  out.set_wheel_sd_mm(std::sqrt(noise.wheel_mm2_s));
+  out.set_heading_sd_rad(std::sqrt(noise.heading_rad2_s));
+  out.set_drift_sd_mm(std::sqrt(noise.drift_mm2_s));
+  out.set_tracker_position_sd_mm(std::sqrt(noise.position_mm2));
+  out.set_tracker_heading_sd_rad(std::sqrt(noise.heading_rad2));
+  out.set_at_walls_sd_mm(std::sqrt(noise.wall_mm2_s));
+  out.set_at_walls_sd_rad(std::sqrt(noise.wall_rad2_s));
+  out.set_at_robots_sd_mm(std::sqrt(noise.contact_mm2_s));
+  out.set_at_robots_sd_rad(std::sqrt(noise.contact_rad2_s));
+  return out;
+}
+
+identification::Walls walls_of(const Walls& walls) {
+  identification::Walls out;
+  if (std::isfinite(walls.x_low_mm)) out.set_x_low_mm(walls.x_low_mm);
+  if (std::isfinite(walls.x_high_mm)) out.set_x_high_mm(walls.x_high_mm);
+  if (std::isfinite(walls.y_low_mm)) out.set_y_low_mm(walls.y_low_mm);
+  if (std::isfinite(walls.y_high_mm)) out.set_y_high_mm(walls.y_high_mm);
+  return out;
 }
 
 /// What a reader must know about the errors and the search; empty: nothing.
@@ -325,56 +340,65 @@ std::string caveats_of(const Findings& f) {
   return fmt::format("{}", fmt::join(sentences, " "));
 }
 
-/// [row][column]; null where there are no data.
-json rows_of(const Eigen::MatrixXd& values) {
-  json rows = json::array();
-  for (Eigen::Index i = 0; i < values.rows(); ++i) {
-    json row = json::array();
-    for (Eigen::Index j = 0; j < values.cols(); ++j)
-      row.push_back(std::isnan(values(i, j)) ? json() : json(values(i, j)));
-    rows.push_back(std::move(row));
+identification::Check check_of(const Findings& f) {
+  identification::Check out;
+  for (const CheckedModel& model : f.check.path) {
+    identification::CheckedModel& checked = *out.add_path();
+    assign(checked.mutable_effects(), model.effects);
+    checked.set_rmse_mm(model.rmse_mm);
   }
-  return rows;
-}
-
-json pattern_of(const Pattern& p) {
-  json covariates = json::array(), units = json::array();
-  for (const Feature f : p.over) {
-    covariates.push_back(name_of(f));
-    units.push_back(unit_of(f));
-  }
-  return {{"covariates", covariates},
-          {"units", units},
-          {"components", p.in_body ? json{"ahead", "left"} : json{"x", "y"}},
-          {"share", p.share},
-          {"at", p.at},
-          {"and_at", p.and_at},
-          {"first_mm", rows_of(p.first_mm)},
-          {"second_mm", rows_of(p.second_mm)}};
-}
-
-json unexplained_of(const Unexplained& u) {
-  json patterns = json::array();
-  for (const Pattern& p : u.patterns) patterns.push_back(pattern_of(p));
-  json out = {{"large", u.large()},
-              {"systematic_mm", u.systematic_mm},
-              {"share", u.share},
-              {"expected_mm", u.expected_mm},
-              {"repetitions_mm", u.repetitions_mm ? json(*u.repetitions_mm) : json()},
-              {"learner", nullptr},
-              {"patterns", patterns},
-              {"in_words", u.in_words}};
-  if (u.learner)
-    out["learner"] = {{"error_mm", u.learner->error_mm},
-                      {"error_left_mm", u.learner->error_left_mm},
-                      {"less_by_low_mm", u.learner->less_by_mm.low_mm},
-                      {"less_by_high_mm", u.learner->less_by_mm.high_mm},
-                      {"cross_validated", u.learner->cross_validated}};
+  out.set_kept(static_cast<std::uint32_t>(f.check.kept));
+  assign(out.mutable_dropped(), f.check.dropped);
+  if (const std::string caveats = caveats_of(f); !caveats.empty()) out.set_in_words(caveats);
   return out;
 }
 
-json robots_of(const Findings& f, const MeasuredSet& judged) {
-  json robots = json::array();
+/// One list per row; null where there are no data.
+void assign_rows(google::protobuf::RepeatedPtrField<JsonList>* field, const Eigen::MatrixXd& values) {
+  for (Eigen::Index i = 0; i < values.rows(); ++i) {
+    std::vector<double> row;
+    for (Eigen::Index j = 0; j < values.cols(); ++j) row.push_back(values(i, j));
+    *field->Add() = json_list(row);
+  }
+}
+
+identification::Pattern pattern_of(const Pattern& p) {
+  identification::Pattern out;
+  for (const Feature f : p.over) {
+    out.add_covariates(name_of(f));
+    out.add_units(unit_of(f));
+  }
+  out.add_components(p.in_body ? "ahead" : "x");
+  out.add_components(p.in_body ? "left" : "y");
+  out.set_share(p.share);
+  assign(out.mutable_at(), p.at);
+  assign(out.mutable_and_at(), p.and_at);
+  assign_rows(out.mutable_first_mm(), p.first_mm);
+  assign_rows(out.mutable_second_mm(), p.second_mm);
+  return out;
+}
+
+identification::Unexplained unexplained_of(const Unexplained& u) {
+  identification::Unexplained out;
+  out.set_large(u.large());
+  out.set_systematic_mm(u.systematic_mm);
+  out.set_share(u.share);
+  out.set_expected_mm(u.expected_mm);
+  *out.mutable_repetitions_mm() = json_value(u.repetitions_mm);
+  for (const Pattern& p : u.patterns) *out.add_patterns() = pattern_of(p);
+  out.set_in_words(u.in_words);
+  if (u.learner) {
+    identification::Learner& learner = *out.mutable_learner();
+    learner.set_error_mm(u.learner->error_mm);
+    learner.set_error_left_mm(u.learner->error_left_mm);
+    learner.set_less_by_low_mm(u.learner->less_by_mm.low_mm);
+    learner.set_less_by_high_mm(u.learner->less_by_mm.high_mm);
+    learner.set_cross_validated(u.learner->cross_validated);
+  }
+  return out;
+}
+
+void add_robots(identification::Result& out, const Findings& f, const MeasuredSet& judged) {
   std::map<std::uint32_t, std::array<double, 3>> by_robot;
   for (const Judged* side : {&f.before, &f.after}) {
     for (const auto& [track, part] : side->errors.by_track) {
@@ -384,98 +408,115 @@ json robots_of(const Findings& f, const MeasuredSet& judged) {
     }
   }
   for (const auto& [robot, bias] : f.found.fit.model.robots) {
-    json entry = {{"robot", robot},
-                  {"bias_left_mm_s", bias.mean_mm_s[0]},
-                  {"bias_right_mm_s", bias.mean_mm_s[1]},
-                  {"sd_left_mm_s", std::sqrt(bias.covariance(0, 0))},
-                  {"sd_right_mm_s", std::sqrt(bias.covariance(1, 1))}};
-    if (const auto known = f.uncertainty.biases.find(robot); known != f.uncertainty.biases.end()) {
-      entry["sd_left_mm_s"] = std::sqrt(known->second(0, 0));
-      entry["sd_right_mm_s"] = std::sqrt(known->second(1, 1));
-    }
+    identification::Robot& entry = *out.add_robots();
+    const auto known = f.uncertainty.biases.find(robot);
+    const Eigen::Matrix2d covariance = known != f.uncertainty.biases.end() ? known->second : bias.covariance;
+    entry.set_robot(robot);
+    entry.set_bias_left_mm_s(bias.mean_mm_s[0]);
+    entry.set_bias_right_mm_s(bias.mean_mm_s[1]);
+    entry.set_sd_left_mm_s(std::sqrt(covariance(0, 0)));
+    entry.set_sd_right_mm_s(std::sqrt(covariance(1, 1)));
     if (const auto sums = by_robot.find(robot); sums != by_robot.end() && sums->second[2] > 0) {
-      entry["before_mm"] = std::sqrt(sums->second[0] / sums->second[2]);
-      entry["after_mm"] = std::sqrt(sums->second[1] / sums->second[2]);
+      entry.set_before_mm(std::sqrt(sums->second[0] / sums->second[2]));
+      entry.set_after_mm(std::sqrt(sums->second[1] / sums->second[2]));
     }
-    robots.push_back(entry);
   }
-  return robots;
 }
 
-json contract_of(const Findings& f, const MeasuredSet& judged, double horizon_s) {
-  const MotionModel& after = f.found.fit.model;
-  json contract;
-  contract["before"] = summary_of(f.before.errors, f.bounds, &ErrorBounds::before);
-  contract["after"] = summary_of(f.after.errors, f.bounds, &ErrorBounds::after);
-  if (f.before.errors.rows > 0)
-    contract["free"] = {
-        {"before_mm", f.free_before.rows > 0 ? json(f.free_before.rmse_mm()) : json()},
-        {"after_mm", f.free_after.rows > 0 ? json(f.free_after.rmse_mm()) : json()},
-        {"rows", f.free_after.rows},
-        {"share_of_rows", static_cast<double>(f.free_after.rows) / static_cast<double>(f.before.errors.rows)}};
-  contract["improvement"] = improvement_of(f.before.errors, f.after.errors, f.bounds);
-  contract["held_out"] = {{"kind", name_of(f.held_out)}, {"in_words", identify::in_words(f.held_out)}};
-  contract["noise_floor_mm"] = f.expected_mm;
-  contract["noise_floor_how"] =
+/// Errors on held-out data, and what they are compared with.
+void add_errors(identification::Result& out, const Findings& f, double horizon_s) {
+  *out.mutable_before() = accuracy_of(f.before.errors, f.bounds, &ErrorBounds::before);
+  *out.mutable_after() = accuracy_of(f.after.errors, f.bounds, &ErrorBounds::after);
+  if (f.before.errors.rows > 0) {
+    identification::FreeRobots& free = *out.mutable_free();
+    *free.mutable_before_mm() = f.free_before.rows > 0 ? json_value(f.free_before.rmse_mm()) : json_null();
+    *free.mutable_after_mm() = f.free_after.rows > 0 ? json_value(f.free_after.rmse_mm()) : json_null();
+    free.set_rows(static_cast<std::uint32_t>(f.free_after.rows));
+    free.set_share_of_rows(static_cast<double>(f.free_after.rows) / static_cast<double>(f.before.errors.rows));
+  }
+  *out.mutable_improvement() = improvement_of(f.before.errors, f.after.errors, f.bounds);
+  out.mutable_held_out()->set_kind(name_of(f.held_out));
+  out.mutable_held_out()->set_in_words(identify::in_words(f.held_out));
+  out.set_noise_floor_mm(f.expected_mm);
+  out.set_noise_floor_how(
       "the error that the model with effects predicts for itself: filter uncertainty at the start, process noise "
       "over the horizon and tracker noise, all estimated from one-step innovations; what persists from one "
-      "innovation "
-      "to the next does not count as noise";
+      "innovation to the next does not count as noise");
   if (f.replicates) {
-    contract["replicates"] = {{"floor_mm", f.replicates->floor_mm},
-                              {"repeatable_mm", f.replicates->repeatable_mm},
-                              {"groups", f.replicates->groups},
-                              {"windows", f.replicates->windows}};
+    identification::Replicates& replicates = *out.mutable_replicates();
+    replicates.set_floor_mm(f.replicates->floor_mm);
+    replicates.set_repeatable_mm(f.replicates->repeatable_mm);
+    replicates.set_groups(static_cast<std::uint32_t>(f.replicates->groups));
+    replicates.set_windows(static_cast<std::uint32_t>(f.replicates->windows));
   }
-  contract["horizon_s"] = horizon_s;
-  contract["effects"] = effects_of(f);
-  if (const double lag_s = after.base.command_lag_s; lag_s != 0)
-    contract["command_lag"] = {
-        {"lag_s", lag_s},
-        {"in_words",
-         fmt::format("The tracks follow the commands {:.3f} s {} than stamped. The fit allows for it; check the "
-                     "clocks of tracker and commands.",
-                     std::abs(lag_s), lag_s > 0 ? "later" : "earlier")}};
-  contract["numbering"] = numbering_of(f.numbering);
-  contract["check"] = check_of(f.check);
-  if (const std::string caveats = caveats_of(f); !caveats.empty()) contract["check"]["in_words"] = caveats;
-  contract["search"] = {{"work", f.found.work}, {"limit", f.found.limit}};
-  contract["unexplained"] = unexplained_of(f.unexplained);
-  contract["next"] = next_step(f);
-  contract["rejected"] = rejected_of(f.found);
-  contract["ambiguous"] = ambiguous_of(f.found);
-  contract["base"] = base_of(after.base);
-  contract["base_sd"] = base_sd_of(f.uncertainty);
-  contract["disc_centre"] = disc_centre_of(after);
-  contract["robots"] = robots_of(f, judged);
-  contract["noise"] = noise_of(after.noise);
-  contract["walls"] = walls_of(after.walls);
-  return contract;
+  out.set_horizon_s(horizon_s);
+}
+
+identification::Result result_of(const Findings& f, const MeasuredSet& judged, double horizon_s) {
+  const MotionModel& after = f.found.fit.model;
+  identification::Result out;
+  add_errors(out, f, horizon_s);
+  *out.mutable_effects() = effects_of(f);
+  if (const double lag_s = after.base.command_lag_s; lag_s != 0) {
+    out.mutable_command_lag()->set_lag_s(lag_s);
+    out.mutable_command_lag()->set_in_words(
+        fmt::format("The tracks follow the commands {:.3f} s {} than stamped. The fit allows for it; check the "
+                    "clocks of tracker and commands.",
+                    std::abs(lag_s), lag_s > 0 ? "later" : "earlier"));
+  }
+  *out.mutable_numbering() = entry_of(f.numbering);
+  *out.mutable_check() = check_of(f);
+  out.mutable_search()->set_work(static_cast<double>(f.found.work));
+  out.mutable_search()->set_limit(f.found.limit);
+  *out.mutable_unexplained() = unexplained_of(f.unexplained);
+  out.set_next(next_step(f));
+  for (const Rejected& r : f.found.rejected) *out.add_rejected() = rejected_of(r);
+  for (const Ambiguity& a : f.found.ambiguous) *out.add_ambiguous() = ambiguous_of(a);
+  *out.mutable_base() = base_of(after.base);
+  *out.mutable_base_sd() = base_sd_of(f.uncertainty);
+  *out.mutable_disc_centre() = disc_centre_of(after);
+  add_robots(out, f, judged);
+  *out.mutable_noise() = noise_of(after.noise);
+  *out.mutable_walls() = walls_of(after.walls);
+  return out;
 }
 
 }  // namespace
 
-json document_of(const Findings& f, const MeasuredSet& train, const MeasuredSet* test, double horizon_s,
-                 std::uint32_t threads) {
-  const MeasuredSet& judged = test != nullptr ? *test : train;
-  json document;
-  document["contract"] = contract_of(f, judged, horizon_s);
-  document["robots"] = document["contract"]["robots"];
-  document["effect_curves"] = document["effect_maps"] = json::array();
+identification::Identification document_of(const Findings& f, const MeasuredSet& train, const MeasuredSet* test,
+                                           double horizon_s, std::uint32_t threads) {
+  identification::Identification out;
+  *out.mutable_result() = result_of(f, test != nullptr ? *test : train, horizon_s);
   for (const Term& term : f.found.fit.model.terms) {
     const std::vector<proto::Effect> written = effects_of_term(term);
-    for (json& curve : curves_of(term.name, written)) document["effect_curves"].push_back(std::move(curve));
-    for (json& map : maps_of(term.name, written)) document["effect_maps"].push_back(std::move(map));
+    for (identification::EffectCurve& curve : curves_of(term.name, written))
+      *out.add_effect_curves() = std::move(curve);
+    for (identification::EffectMap& map : maps_of(term.name, written)) *out.add_effect_maps() = std::move(map);
   }
-  document["set"] = describe_set(train, test, f.held_out);
-  document["steps"] = json::array();
-  for (const Step& step : f.found.steps)
-    document["steps"].push_back({{"added", step.added}, {"held_out_gain", step.held_out}});
-  const std::vector<Disturbance> left_before = disturbances_of(f.base, threads),
-                                 left_after = disturbances_of(f.found.fit, threads);
-  document["covariate_plots"] = covariate_plots(left_before, left_after);
-  document["maps"] = maps(left_before, left_after);
-  return document;
+  *out.mutable_set() = describe_set(train, test, f.held_out);
+  for (const Step& step : f.found.steps) {
+    identification::Step& added = *out.add_steps();
+    added.set_added(step.added);
+    added.set_held_out_gain(step.held_out);
+  }
+  add_residual_plots(out, disturbances_of(f.base, threads), disturbances_of(f.found.fit, threads));
+  return out;
+}
+
+void add_faults(identification::Result& out, const std::vector<DataFault>& faults) {
+  for (const DataFault& f : faults) {
+    identification::Fault& fault = *out.add_faults();
+    fault.set_kind(name_of(f.kind));
+    fault.set_set(f.of_test ? "test" : "train");
+    fault.set_run(f.run);
+    *fault.mutable_robot() = json_value(f.robot);
+    *fault.mutable_other() = json_value(f.other);
+    fault.set_from_s(f.from_s);
+    fault.set_to_s(f.to_s);
+    fault.set_strength(f.strength);
+    fault.set_excluded(f.of_test ? 0 : static_cast<std::uint32_t>(f.excluded));
+    fault.set_in_words(f.in_words());
+  }
 }
 
 }  // namespace kilotwin::identify

@@ -1,7 +1,6 @@
 #include "clients/identify/identify.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <utility>
 
@@ -70,10 +69,11 @@ void assess(Findings& f, const Fitter& fitter, const MeasuredSet& train, const M
       windows_of(f.after.tracks, f.after.forecasts, times.horizon_s), f.after.errors, f.bounds, f.replicates);
 }
 
-/// Errors over the horizon; empty if nothing is held out.
-nlohmann::json horizon_curve(const Findings& f, const Evaluation& evaluation, std::uint32_t threads) {
-  nlohmann::json curve;
-  if (!gives_errors(f.held_out)) return curve;
+/// Errors over the horizon, if anything is held out.
+void add_horizon(identification::Identification& out, const Findings& f, const Evaluation& evaluation,
+                 std::uint32_t threads) {
+  if (!gives_errors(f.held_out)) return;
+  identification::Horizon& curve = *out.mutable_horizon();
   for (const double ahead_s : {1.0, 2.0, 5.0, 10.0, 15.0, 20.0}) {
     const ForecastTimes at{20, 10, ahead_s};
     const auto errors = [&](const MotionModel& model, const PreparedSet& tracks) {
@@ -83,12 +83,11 @@ nlohmann::json horizon_curve(const Findings& f, const Evaluation& evaluation, st
     white.noise = f.white;
     const PredictionErrors was = errors(f.base.model, f.before.tracks),
                            is = errors(f.found.fit.model, f.after.tracks);
-    curve["at_s"].push_back(ahead_s);
-    curve["before_mm"].push_back(was.rmse_mm());
-    curve["after_mm"].push_back(is.rmse_mm());
-    curve["floor_mm"].push_back(errors(white, f.after.tracks).expected_mm());
+    curve.add_at_s(ahead_s);
+    curve.add_before_mm(was.rmse_mm());
+    curve.add_after_mm(is.rmse_mm());
+    curve.add_floor_mm(errors(white, f.after.tracks).expected_mm());
   }
-  return curve;
 }
 
 std::vector<Prediction> predictions_of(const Findings& f, const MeasuredSet& judged) {
@@ -182,7 +181,6 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   const auto say_progress = [&](double part, const std::string& what) {
     if (options.progress) options.progress(part, what);
   };
-  const auto started = std::chrono::steady_clock::now();
   FitState base(train);
   if (base.tracks.units().empty())
     throw UserError("no track of the training runs has two samples; give longer tracks");
@@ -212,9 +210,9 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
 
   Identified out;
   out.predictions = predictions_of(f, evaluation.set());
-  out.document = document_of(f, train, test, options.horizon_s, options.threads);
+  out.found = document_of(f, train, test, options.horizon_s, options.threads);
   say_progress(0.93, "errors over the horizon");
-  out.document["horizon"] = horizon_curve(f, evaluation, options.threads);
+  add_horizon(out.found, f, evaluation, options.threads);
   say_progress(0.95, "simulation check");
   out.model = proto_of(f.found.fit.model);
   const PosteriorDraws posterior(f.found.fit.model, f.uncertainty);
@@ -222,12 +220,8 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   const proto::Model written_before = proto_of(f.base.model);
   // Simulations give no error that a choice could make too small: all held-out tracks count.
   const Tracks compared = test != nullptr ? Tracks::kAll : Tracks::kHeldOut;
-  const nlohmann::json simulated = simulation_check({f.base.model, written_before}, {f.found.fit.model, out.model},
-                                                    f.after.tracks, compared, options.threads);
-  for (const auto& [part, content] : simulated.items())
-    (part == "simulated" ? out.document["contract"] : out.document)[part] = content;
-  out.document["seconds"]["all"] =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+  add_simulation_check({f.base.model, written_before}, {f.found.fit.model, out.model}, f.after.tracks, compared,
+                       options.threads, out.found);
   say_progress(1, "done");
   return out;
 }

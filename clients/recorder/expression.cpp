@@ -11,6 +11,7 @@
 
 #include "core/base/error.hpp"
 #include "core/math/elementary.h"
+#include "core/stats/quantiles.hpp"
 
 namespace kilotwin::recorder {
 namespace {
@@ -377,8 +378,8 @@ double reduce(Operation operation, Values& values, double q) {
     case Operation::kShare:
       for (double& value : values) value = truth(value != 0);
       return mean_of(values);
-    case Operation::kMedian: return quantile_of(values, 0.5);
-    case Operation::kQuantile: return quantile_of(values, q);
+    case Operation::kMedian: return stats::interpolated_quantile(values, 0.5);
+    case Operation::kQuantile: return stats::interpolated_quantile(values, q);
     default: break;
   }
   const double mean = mean_of(values);
@@ -432,17 +433,6 @@ class Evaluation {
 };
 
 }  // namespace
-
-double quantile_of(std::vector<double>& values, double q) {
-  if (values.empty() || !(q >= 0 && q <= 1)) return kNone;
-  const double place = q * static_cast<double>(values.size() - 1);
-  const auto below = static_cast<std::size_t>(place);
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(below);
-  std::nth_element(values.begin(), at, values.end());
-  const double low = *at, part = place - static_cast<double>(below);
-  if (part == 0) return low;
-  return low + part * (*std::min_element(at + 1, values.end()) - low);
-}
 
 Expression::Expression(std::unique_ptr<Node> root, std::vector<std::string> names)
     : root_(std::move(root)), names_(std::move(names)) {}

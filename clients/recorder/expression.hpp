@@ -52,8 +52,4 @@ class Expression {
   std::vector<std::string> names_;
 };
 
-/// The value below which a share `q` (0..1) of the values lies, with linear interpolation between order statistics; NaN without
-/// values. Reorders them.
-[[nodiscard]] double quantile_of(std::vector<double>& values, double q);
-
 }  // namespace kilotwin::recorder

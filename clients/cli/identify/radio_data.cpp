@@ -1,89 +1,140 @@
 #include "clients/cli/identify/radio_data.hpp"
 
 #include <fmt/format.h>
-#include <google/protobuf/text_format.h>
 
-#include <chrono>
+#include <array>
 #include <cmath>
-#include <fstream>
-#include <sstream>
+#include <map>
 
 #include "clients/identify/radio/radio_fit.hpp"
-#include "core/base/error.hpp"
+#include "clients/identify/result/values.hpp"
 
 namespace kilotwin::cli {
 namespace fs = std::filesystem;
 namespace {
 
-using nlohmann::json;
+using identification::RadioErrors, identification::RadioStep;
+using identify::json_list, identify::json_value;
 
 /// Simulated runs per effect and set, and sampled swarms: some minutes of one core in total.
 constexpr int kRuns = 24, kSwarms = 80;
 
-std::string text_of(const fs::path& file) {
-  std::ifstream in(file);
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (!in) throw RunError(fmt::format("{}: cannot be read", file.string()));
-  return text.str();
-}
-
 /// Mean over the sets of one error of a step, in absolute value.
-double mean_of(const json& step, const char* error) {
-  double sum = 0, sets = 0;
-  for (const json& of_set : step.at("errors")) {
-    sum += std::abs(of_set.at(error).get<double>());
-    ++sets;
-  }
-  return sets > 0 ? sum / sets : 0;
+double mean_of(const RadioStep& step, double (RadioErrors::*error)() const) {
+  double sum = 0;
+  // By name: the order of additions is that of the sets.
+  for (const auto& [set, errors] : std::map(step.errors().begin(), step.errors().end()))
+    sum += std::abs((errors.*error)());
+  return step.errors().empty() ? 0 : sum / static_cast<double>(step.errors().size());
 }
 
-json summary_of(const json& step) {
-  json summary = json::object();
-  for (const char* error : {"deficit", "sent_error", "near_worst", "far_worst", "silent_error", "run_spread_error"})
-    summary[error] = mean_of(step, error);
-  return summary;
+identification::Accuracy accuracy_of(const RadioStep& step) {
+  identification::Accuracy out;
+  out.set_deficit(mean_of(step, &RadioErrors::deficit));
+  out.set_sent_error(mean_of(step, &RadioErrors::sent_error));
+  out.set_near_worst(mean_of(step, &RadioErrors::near_worst));
+  out.set_far_worst(mean_of(step, &RadioErrors::far_worst));
+  out.set_silent_error(mean_of(step, &RadioErrors::silent_error));
+  out.set_run_spread_error(mean_of(step, &RadioErrors::run_spread_error));
+  return out;
 }
 
-std::string figure(const json& value) { return fmt::format("{:.3f}", value.get<double>()); }
+std::string figure(double value) { return fmt::format("{:.3f}", value); }
 
 /// Errors of each step on held-out runs, by set.
-json table_of_errors(const json& steps) {
-  json rows = json::array();
-  for (const json& step : steps) {
-    for (const auto& [set, e] : step.at("errors").items())
-      rows.push_back({step.at("name"), set, fmt::format("{:+.1f}", e.at("sent_error").get<double>()),
-                      figure(e.at("near_worst")), figure(e.at("far_worst")), figure(e.at("silent_error")),
-                      figure(e.at("run_spread_error")), figure(e.at("deficit"))});
+identification::Table table_of_errors(const identification::RadioFit& fit) {
+  identification::Table table;
+  table.set_id("errors");
+  table.set_title("Errors on held-out runs, effect by effect");
+  table.set_lead(
+      "Sent: messages per robot, simulated minus measured. Near, far: largest error of the reception share, up to "
+      "105 mm and beyond 125 mm. Silent: error of the share of pairs without reception. Runs: error of the "
+      "standard deviation between runs. Deficit: log-likelihood of the counts below that of the training runs' "
+      "means, per pair and run.");
+  identify::assign(table.mutable_head(),
+                   std::array{"with", "set", "sent", "near", "far", "silent", "runs", "deficit, nat"});
+  for (const RadioStep& step : fit.effects()) {
+    for (const auto& [set, e] : std::map(step.errors().begin(), step.errors().end()))
+      *table.add_rows() = json_list(std::array{
+          step.name(), set, fmt::format("{:+.1f}", e.sent_error()), figure(e.near_worst()), figure(e.far_worst()),
+          figure(e.silent_error()), figure(e.run_spread_error()), figure(e.deficit())});
   }
-  return {
-      {"id", "errors"},
-      {"title", "Errors on held-out runs, effect by effect"},
-      {"lead",
-       "Sent: messages per robot, simulated minus measured. Near, far: largest error of the reception share, up to "
-       "105 mm and beyond 125 mm. Silent: error of the share of pairs without reception. Runs: error of the "
-       "standard deviation between runs. Deficit: log-likelihood of the counts below that of the training runs' "
-       "means, per pair and run."},
-      {"head", {"with", "set", "sent", "near", "far", "silent", "runs", "deficit, nat"}},
-      {"rows", rows}};
+  return table;
 }
 
 /// Predictive check on new robots: does the measured set look like a sample of the fitted population?
-json table_of_population(const json& population) {
-  json rows = json::array();
-  for (const json& c : population)
-    rows.push_back({c.at("set"), fmt::format("{:.0f}", c.at("distance_mm").get<double>()), figure(c.at("measured")),
-                    figure(c.at("median")),
-                    fmt::format("{:.2f} to {:.2f}{}", c.at("low").get<double>(), c.at("high").get<double>(),
-                                c.at("inside").get<bool>() ? "" : ", outside")});
-  return {
-      {"id", "population"},
-      {"title", "Predictive check: new robots"},
-      {"lead",
-       "Reception share over distance: measured on held-out runs, and simulated for random swarms of the fitted "
-       "population."},
-      {"head", {"set", "distance, mm", "measured", "median swarm", "95 % of swarms"}},
-      {"rows", rows}};
+identification::Table table_of_population(const identification::RadioFit& fit) {
+  identification::Table table;
+  table.set_id("population");
+  table.set_title("Predictive check: new robots");
+  table.set_lead(
+      "Reception share over distance: measured on held-out runs, and simulated for random swarms of the fitted "
+      "population.");
+  identify::assign(table.mutable_head(),
+                   std::array{"set", "distance, mm", "measured", "median swarm", "95 % of swarms"});
+  for (const identification::PopulationClass& c : fit.population())
+    *table.add_rows() = json_list(
+        std::array{c.set(), fmt::format("{:.0f}", c.distance_mm()), figure(c.measured()), figure(c.median()),
+                   fmt::format("{:.2f} to {:.2f}{}", c.low(), c.high(), c.inside() ? "" : ", outside")});
+  return table;
+}
+
+/// An effect with its gain over the step before it.
+identification::Effect effect_of(const RadioStep& step, const RadioStep& before) {
+  const double deficit_before = mean_of(before, &RadioErrors::deficit),
+               deficit = mean_of(step, &RadioErrors::deficit);
+  identification::Effect effect;
+  effect.set_name(step.name());
+  *effect.mutable_covariates() = step.covariates();
+  effect.set_acts_on(step.acts_on());
+  *effect.mutable_evidence() = step.evidence();
+  (*effect.mutable_parameters()->mutable_fields())["added"] = json_value(step.parameters().added());
+  effect.set_deficit_before(deficit_before);
+  effect.set_deficit_after(deficit);
+  auto& facts = *effect.mutable_facts()->mutable_fields();
+  facts["deficit"] = json_value(fmt::format("{:.3f} nat before, {:.3f} nat with it", deficit_before, deficit));
+  if (!step.evidence().what().empty()) facts["evidence"] = json_value(step.evidence().what());
+  effect.set_in_words(fmt::format("{}: {}", step.name(), step.parameters().added()));
+  return effect;
+}
+
+identification::Result result_of(const identification::RadioFit& fit) {
+  identification::Result result;
+  *result.mutable_before() = accuracy_of(fit.effects(0));
+  *result.mutable_after() = accuracy_of(*fit.effects().rbegin());
+  // The first step is the ARGoS model.
+  for (int s = 1; s < fit.effects_size(); ++s)
+    *result.add_effects() = effect_of(fit.effects(s), fit.effects(s - 1));
+  *result.mutable_fitted_runs_themselves() = fit.fitted_runs_themselves();
+  *result.mutable_shared() = fit.shared();
+  *result.mutable_of_each_set() = fit.of_each_set();
+  *result.mutable_measured_sent() = fit.measured_sent();
+  *result.mutable_population() = fit.population();
+  return result;
+}
+
+/// Texts and bars of the page in place of trajectory errors.
+void add_words(identification::Identification& found) {
+  const identification::Accuracy &before = found.result().before(), &after = found.result().after();
+  const std::string verdict = fmt::format(
+      "On held-out runs, the log-likelihood of the counts is {:.2f} nat per pair and run below that of the "
+      "training runs' means in the ARGoS paper's model, and {:.2f} nat below with all effects. The largest error "
+      "of "
+      "the reception share is {:.3f} up to 105 mm ({:.3f} before) and {:.3f} beyond 125 mm ({:.3f} before).",
+      before.deficit(), after.deficit(), after.near_worst(), before.near_worst(), after.far_worst(),
+      before.far_worst());
+  found.set_headline("Radio model of these robots");
+  found.set_verdict(verdict);
+  found.add_summary(verdict);
+  const auto add_bar = [&](const char* kind, const char* name, double value) {
+    identification::Bar& bar = *found.add_bars();
+    bar.set_kind(kind);
+    bar.set_name(name);
+    bar.set_value(value);
+    bar.set_unit("nat");
+  };
+  add_bar("before", "the ARGoS paper's model", before.deficit());
+  add_bar("after", "with effects", after.deficit());
 }
 
 }  // namespace
@@ -100,7 +151,6 @@ bool has_radio_runs(const fs::path& directory) {
 
 identify::Identified identify_radio_runs(const fs::path& train, const fs::path& test, const fs::path& out,
                                          const identify::Options& options) {
-  const auto started = std::chrono::steady_clock::now();
   radio_fit::FitOptions fit;
   fit.train = train;
   fit.test = test;
@@ -108,58 +158,16 @@ identify::Identified identify_radio_runs(const fs::path& train, const fs::path& 
   fit.runs = kRuns;
   fit.swarms = kSwarms;
   fit.progress = options.progress ? options.progress : [](double, const std::string&) {};
-  radio_fit::fit_radio(fit);
+  const radio_fit::RadioFound fitted = radio_fit::fit_radio(fit);
 
-  const json fitted = json::parse(text_of(fit.out / "result.json"));
   identify::Identified result;
-  if (!google::protobuf::TextFormat::ParseFromString(text_of(fit.out / "model.txtpb"), &result.model))
-    throw RunError(fmt::format("{}: is not a model", (fit.out / "model.txtpb").string()));
-  const json& steps = fitted.at("effects");
-  // The first step is the ARGoS model.
-  json effects = json::array();
-  for (std::size_t s = 1; s < steps.size(); ++s) {
-    const json& step = steps[s];
-    const double before = mean_of(steps[s - 1], "deficit"), after = mean_of(step, "deficit");
-    json facts = {{"deficit", fmt::format("{:.3f} nat before, {:.3f} nat with it", before, after)}};
-    if (const std::string what = step.at("evidence").value("what", ""); !what.empty()) facts["evidence"] = what;
-    effects.push_back({{"name", step.at("name")},
-                       {"covariates", step.at("covariates")},
-                       {"acts_on", "radio"},
-                       {"evidence", step.at("evidence")},
-                       {"parameters", step.at("parameters")},
-                       {"deficit_before", before},
-                       {"deficit_after", after},
-                       {"facts", facts},
-                       {"in_words", fmt::format("{}: {}", step.at("name").get<std::string>(),
-                                                step.at("parameters").at("added").get<std::string>())}});
-  }
-  const json before = summary_of(steps.front()), after = summary_of(steps.back());
-  json& contract = result.document["contract"];
-  contract = {{"before", before},           {"after", after},
-              {"effects", effects},         {"rejected", json::array()},
-              {"ambiguous", json::array()}, {"faults", json::array()}};
-  for (const auto& [key, value] : fitted.items()) {
-    if (key != "effects") contract[key] = value;
-  }
-  const auto of = [](const json& summary, const char* error) { return summary.at(error).get<double>(); };
-  const std::string verdict = fmt::format(
-      "On held-out runs, the log-likelihood of the counts is {:.2f} nat per pair and run below that of the "
-      "training "
-      "runs' means in the ARGoS paper's model, and {:.2f} nat below with all effects. The largest error of the "
-      "reception "
-      "share is {:.3f} up to 105 mm ({:.3f} before) and {:.3f} beyond 125 mm ({:.3f} before).",
-      of(before, "deficit"), of(after, "deficit"), of(after, "near_worst"), of(before, "near_worst"),
-      of(after, "far_worst"), of(before, "far_worst"));
-  result.document["headline"] = "Radio model of these robots";
-  result.document["verdict"] = verdict;
-  result.document["summary"] = {verdict};
-  result.document["bars"] = {
-      {{"kind", "before"}, {"name", "the ARGoS paper's model"}, {"value", of(before, "deficit")}, {"unit", "nat"}},
-      {{"kind", "after"}, {"name", "with effects"}, {"value", of(after, "deficit")}, {"unit", "nat"}}};
-  result.document["tables"] = {table_of_errors(steps), table_of_population(fitted.at("population"))};
-  result.document["set"] = {{"has_headings", false}, {"has_commands", false}};
-  result.document["seconds"]["all"] =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+  result.model = fitted.model;
+  *result.found.mutable_result() = result_of(fitted.fit);
+  add_words(result.found);
+  *result.found.add_tables() = table_of_errors(fitted.fit);
+  *result.found.add_tables() = table_of_population(fitted.fit);
+  result.found.mutable_set()->set_has_headings(false);
+  result.found.mutable_set()->set_has_commands(false);
   return result;
 }
 

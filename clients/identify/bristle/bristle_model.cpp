@@ -10,7 +10,7 @@
 #include <set>
 
 #include "clients/identify/bristle/velocity_circle.hpp"
-#include "core/math/median.hpp"
+#include "core/stats/quantiles.hpp"
 
 namespace kilotwin::bristle {
 namespace {
@@ -137,7 +137,7 @@ struct RunEstimates {
     return drifting ? way - circle.drift * circle.speed_mm_s : way;
   }
   [[nodiscard]] double own_speed(bool drifting) const {
-    return drifting ? circle.speed_mm_s : upper_median(speeds);
+    return drifting ? circle.speed_mm_s : stats::upper_median(speeds);
   }
   [[nodiscard]] double own_mount() const { return std::arg(mount + kPrior) / 2; }
   [[nodiscard]] double own_turn() const { return turn / (turns + kPrior); }
@@ -199,7 +199,7 @@ BristleModel::BristleModel(const std::vector<BristleInstant>& train) {
     same_axis += unit(2 * (way - i.axis_rad));
   }
   const double n = std::max<double>(static_cast<double>(train.size()), 1);
-  speed_mm_s = upper_median(speeds);
+  speed_mm_s = stats::upper_median(speeds);
   aligned = std::abs(same) / n;
   aligned_turned = std::abs(turned) / n;
   aligned_axis = std::abs(turned_axis) / n;
@@ -221,14 +221,15 @@ BristleModel::BristleModel(const std::vector<BristleInstant>& train) {
     for (const BristleInstant& i : train) {
       std::vector<double> own;
       for (const std::complex<double>& way : ways_of[i.run]) own.push_back(std::abs(way));
-      all.push_back({i.run, {i.vx_mm_s, i.vy_mm_s}, unit(sense_rad - i.axis_rad), upper_median(own)});
+      all.push_back({i.run, {i.vx_mm_s, i.vy_mm_s}, unit(sense_rad - i.axis_rad), stats::upper_median(own)});
     }
     drift_across_headings(all, xs, ys);
   }
   drift_runs = xs.size();
   if (xs.empty()) return;
   const auto middle = [&](const std::vector<double>& v) {
-    return across ? std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size()) : upper_median(v);
+    return across ? std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size())
+                  : stats::upper_median(v);
   };
   drift_x = middle(xs);
   drift_y = middle(ys);

@@ -4,31 +4,44 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <complex>
 #include <map>
+#include <optional>
 
 #include "clients/identify/bristle/bristle_model.hpp"
 #include "clients/identify/bristle/velocity_circle.hpp"
+#include "clients/identify/result/values.hpp"
 #include "core/base/error.hpp"
+#include "core/stats/distributions.hpp"
 
 namespace kilotwin::bristle {
 namespace {
 
-using identify::Identified, identify::Options;
-using nlohmann::json;
+using identify::Identified, identify::Options, identify::json_value;
 /// False alarm rate per set.
 constexpr double kChance = 0.01;
+/// An effect enters the model if its gain exceeds as many standard errors over runs. Then less than 1 in 100 sets has a
+/// false alarm, over six tests.
+constexpr double kStandardErrors = 3;
+constexpr double kPi = 3.14159265358979;
 using Places = std::vector<BristleModel::Place>;
 
-constexpr const char* kNames[] = {"heading-sense", "heading-mount", "front-for-back",
-                                  "speed-of-run",  "downhill",      "turning-of-run"};
-constexpr const char* kCovariates[][2] = {{"measurement", "heading"}, {"measurement", "robot"},
-                                          {"measurement", "history"}, {"robot", "history"},
-                                          {"world_frame", "history"}, {"robot", "history"}};
-constexpr const char* kActsOn[] = {"MEASURED_HEADING", "MEASURED_HEADING", "MEASURED_HEADING",
-                                   "WHEEL_GAIN",       "WORLD_DRIFT",      "TURN_RATE"};
+/// How an effect is called in result.json.
+struct EffectNames {
+  const char* name;
+  std::array<const char*, 2> covariates;
+  const char* acts_on;
+};
+constexpr std::array<EffectNames, kBristleEffects> kEffects = {
+    {{"heading-sense", {"measurement", "heading"}, "MEASURED_HEADING"},
+     {"heading-mount", {"measurement", "robot"}, "MEASURED_HEADING"},
+     {"front-for-back", {"measurement", "history"}, "MEASURED_HEADING"},
+     {"speed-of-run", {"robot", "history"}, "WHEEL_GAIN"},
+     {"downhill", {"world_frame", "history"}, "WORLD_DRIFT"},
+     {"turning-of-run", {"robot", "history"}, "TURN_RATE"}}};
+
+constexpr std::size_t index_of(BristleEffect effect) { return static_cast<std::size_t>(effect); }
 
 /// Squared errors with sums per run. Runs are independent.
 struct Errors {
@@ -66,14 +79,16 @@ Errors errors_of(const std::vector<BristleInstant>& instants, const Places& plac
   return errors;
 }
 
-json summary_of(const Errors& errors) {
-  const double mean = errors.mean(), half = 1.96 * errors.error();
+identification::Accuracy accuracy_of(const Errors& errors) {
+  const double mean = errors.mean(), half = stats::kNormal95 * errors.error();
   double rows = 0;
   for (const double n : errors.count) rows += n;
-  return {{"rmse_mm", std::sqrt(mean)},
-          {"rmse_low_mm", std::sqrt(std::max(mean - half, 0.0))},
-          {"rmse_high_mm", std::sqrt(mean + half)},
-          {"rows", static_cast<std::int64_t>(rows)}};
+  identification::Accuracy out;
+  *out.mutable_rmse_mm() = json_value(std::sqrt(mean));
+  out.set_rmse_low_mm(std::sqrt(std::max(mean - half, 0.0)));
+  out.set_rmse_high_mm(std::sqrt(mean + half));
+  out.set_rows(static_cast<std::uint32_t>(rows));
+  return out;
 }
 
 /// Four-fold cross-validation over the training runs.
@@ -138,38 +153,44 @@ std::string words_of(BristleEffect effect, const BristleModel& m) {
       return fmt::format("the speed differs between runs; median {:.0f} mm/s", m.speed_mm_s);
     case BristleEffect::kDrift: {
       const double size = std::hypot(m.drift_x, m.drift_y),
-                   direction = std::atan2(m.drift_y, m.drift_x) * 180 / 3.14159265358979;
+                   direction = std::atan2(m.drift_y, m.drift_x) * 180 / kPi;
       return fmt::format(
           "robots drift towards {:.0f} degrees by {:.2f} +- {:.2f} of their speed (median of {} runs, standard "
           "deviation "
           "between runs {:.2f})",
-          direction, size, 1.96 * m.drift_se, m.drift_runs, m.drift_sd);
+          direction, size, stats::kNormal95 * m.drift_se, m.drift_runs, m.drift_sd);
     }
     case BristleEffect::kTurn: return "the turn rate differs between runs";
   }
   return {};
 }
 
-json parameters_of(BristleEffect effect, const BristleModel& m) {
+google::protobuf::Struct parameters_of(BristleEffect effect, const BristleModel& m) {
+  google::protobuf::Struct out;
+  const auto put = [&](const char* name, const auto& value) { (*out.mutable_fields())[name] = json_value(value); };
   switch (effect) {
     case BristleEffect::kSense:
-      return {{"form", "linear in the heading"}, {"slope", -2}, {"at_zero_rad", m.sense_rad}};
-    case BristleEffect::kAxis: return {{"form", "occasional offset of pi"}};
+      put("form", "linear in the heading");
+      put("slope", -2);
+      put("at_zero_rad", m.sense_rad);
+      return out;
+    case BristleEffect::kAxis: put("form", "occasional offset of pi"); return out;
     case BristleEffect::kDrift:
-      return {{"form", "constant times the speed"},
-              {"x", m.drift_x},
-              {"y", m.drift_y},
-              {"se", m.drift_se},
-              {"sd_between_runs", m.drift_sd}};
-    case BristleEffect::kSpeed: return {{"form", "table by run"}, {"median_mm_s", m.speed_mm_s}};
-    default: return {{"form", "table by run"}};
+      put("form", "constant times the speed");
+      put("x", m.drift_x);
+      put("y", m.drift_y);
+      put("se", m.drift_se);
+      put("sd_between_runs", m.drift_sd);
+      return out;
+    case BristleEffect::kSpeed: put("median_mm_s", m.speed_mm_s); [[fallthrough]];
+    default: put("form", "table by run"); return out;
   }
 }
 
 /// Mean speed by direction of motion, minus the run's own: a drift makes one direction faster.
-json speed_by_direction(const std::vector<BristleInstant>& instants, const BristleModel& m, bool drifting) {
+identification::CovariatePlot speed_by_direction(const std::vector<BristleInstant>& instants, const BristleModel& m,
+                                                 bool drifting) {
   constexpr std::size_t kSectors = 8;
-  constexpr double kPi = 3.14159265358979;
   std::map<std::size_t, std::vector<std::complex<double>>> ways;
   for (const BristleInstant& i : instants) ways[i.run].emplace_back(i.vx_mm_s, i.vy_mm_s);
   std::array<double, kSectors> before{}, squares{}, after{}, count{};
@@ -186,45 +207,46 @@ json speed_by_direction(const std::vector<BristleInstant>& instants, const Brist
       ++count[s];
     }
   }
-  json plot = {{"target", "forward"},
-               {"covariate", "direction of motion"},
-               {"unit", "rad"},
-               {"acts_on_unit", "mm/s"},
-               {"fitted", nullptr}};
-  for (const char* list : {"at", "before", "before_se", "after"}) plot[list] = json::array();
+  identification::CovariatePlot plot;
+  plot.set_target("forward");
+  plot.set_covariate("direction of motion");
+  plot.set_unit("rad");
+  plot.set_acts_on_unit("mm/s");
   for (std::size_t s = 0; s < kSectors; ++s) {
     if (count[s] < 5) continue;
     const double mean = before[s] / count[s];
-    plot["at"].push_back((static_cast<double>(s) + 0.5) * 2 * kPi / kSectors - kPi);
-    plot["before"].push_back(mean);
-    plot["before_se"].push_back(std::sqrt(std::max(squares[s] / count[s] - mean * mean, 0.0) / count[s]));
-    plot["after"].push_back(after[s] / count[s]);
+    plot.add_at((static_cast<double>(s) + 0.5) * 2 * kPi / kSectors - kPi);
+    plot.add_before(mean);
+    plot.add_before_se(std::sqrt(std::max(squares[s] / count[s] - mean * mean, 0.0) / count[s]));
+    plot.add_after(after[s] / count[s]);
   }
   return plot;
 }
 
-json table_of_runs(const json& runs) {
-  json rows = json::array();
-  for (const json& run : runs) {
-    const double x = run.at("drift_x_mm_s"), y = run.at("drift_y_mm_s"), speed = run.at("speed_mm_s");
-    rows.push_back({run.at("run"), run.at("held_out").get<bool>() ? "held out" : "training",
-                    fmt::format("{:.0f}", speed), fmt::format("{:+.2f}", speed > 0 ? x / speed : 0),
-                    fmt::format("{:+.2f}", speed > 0 ? y / speed : 0),
-                    fmt::format("{:+.2f}", run.at("turn_rad_s").get<double>())});
+identification::Table table_of_runs(const google::protobuf::RepeatedPtrField<identification::BristleRun>& runs) {
+  identification::Table table;
+  table.set_id("runs");
+  table.set_title("Runs");
+  table.set_lead(
+      "Velocities of a run lie on a circle: its radius is the robot's speed, its centre the drift, given relative "
+      "to "
+      "that speed along x and y. Runs with a single direction use the median drift of the others.");
+  identify::assign(table.mutable_head(),
+                   std::array{"run", "", "speed, mm/s", "drift along x", "along y", "turn rate, rad/s"});
+  for (const identification::BristleRun& run : runs) {
+    const double speed = run.speed_mm_s();
+    *table.add_rows() = identify::json_list(
+        std::array{run.run(), std::string(run.held_out() ? "held out" : "training"), fmt::format("{:.0f}", speed),
+                   fmt::format("{:+.2f}", speed > 0 ? run.drift_x_mm_s() / speed : 0),
+                   fmt::format("{:+.2f}", speed > 0 ? run.drift_y_mm_s() / speed : 0),
+                   fmt::format("{:+.2f}", run.turn_rad_s())});
   }
-  return {{"id", "runs"},
-          {"title", "Runs"},
-          {"lead",
-           "Velocities of a run lie on a circle: its radius is the robot's speed, its centre the drift, given "
-           "relative to "
-           "that speed along x and y. Runs with a single direction use the median drift of the others."},
-          {"head", {"run", "", "speed, mm/s", "drift along x", "along y", "turn rate, rad/s"}},
-          {"rows", rows}};
+  return table;
 }
 
 /// The model file: the median robot on this table.
 proto::Model proto_of(const BristleModel& m, const BristleEffects& on) {
-  const auto has = [&](BristleEffect effect) { return on[static_cast<std::size_t>(effect)]; };
+  const auto has = [&](BristleEffect effect) { return on[index_of(effect)]; };
   proto::Model model;
   model.mutable_motion()->set_straight_speed_mm_s(m.speed_mm_s);
   model.mutable_motion()->set_bias_mean_mm_s(0);
@@ -232,7 +254,7 @@ proto::Model proto_of(const BristleModel& m, const BristleEffects& on) {
   model.mutable_motion()->set_effects_limit_mm_s(std::max(50.0, 2 * m.speed_mm_s));
   if (has(BristleEffect::kSense)) {
     proto::Effect& effect = *model.add_effect();
-    effect.set_name(kNames[0]);
+    effect.set_name(kEffects[0].name);
     effect.set_acts_on(proto::Effect::MEASURED_HEADING);
     proto::Function& function = *effect.add_function();
     function.set_of(proto::Function::HEADING);
@@ -243,207 +265,275 @@ proto::Model proto_of(const BristleModel& m, const BristleEffects& on) {
     proto::Effect& effect = *model.add_effect();
     effect.set_name("downhill");
     effect.set_acts_on(proto::Effect::WORLD_DRIFT);
-    effect.set_direction_deg(std::atan2(m.drift_y, m.drift_x) * 180 / 3.14159265358979);
+    effect.set_direction_deg(std::atan2(m.drift_y, m.drift_x) * 180 / kPi);
     effect.add_function()->set_constant(std::hypot(m.drift_x, m.drift_y) * m.speed_mm_s);
   }
   return model;
 }
 
+/// One identification, in the order of its public functions.
+class BristleIdentification {
+ public:
+  BristleIdentification(const std::vector<BristleRun>& train, const std::vector<BristleRun>& test,
+                        const Options& options)
+      : options_(options),
+        train_(train),
+        test_(test),
+        learned_(instants_of(train, options.horizon_s)),
+        judged_(instants_of(test, options.horizon_s)),
+        model_(demand_instants(learned_, judged_, options.horizon_s)),
+        now_in_(errors_in({})),
+        before_out_(errors_out({})),
+        now_out_(before_out_) {
+    add_step("base", now_out_);
+  }
+
+  /// Forward selection: adds the effect with the largest significant reduction of the error on the training runs.
+  void search();
+  /// Backward elimination by cross-validation.
+  void eliminate();
+  /// Each effect on held-out runs.
+  void judge();
+  [[nodiscard]] Identified result();
+
+ private:
+  static const std::vector<BristleInstant>& demand_instants(const std::vector<BristleInstant>& learned,
+                                                            const std::vector<BristleInstant>& judged,
+                                                            double horizon_s) {
+    if (learned.empty() || judged.empty())
+      throw UserError(fmt::format("no run has {:g} s without a gap; give a shorter --horizon", horizon_s + 3));
+    return learned;
+  }
+  [[nodiscard]] identification::Result& out() { return *found_.mutable_result(); }
+  [[nodiscard]] Errors errors_in(const BristleEffects& on) const {
+    return errors_of(learned_, model_.predict(learned_, options_.horizon_s, on), train_.size());
+  }
+  [[nodiscard]] Errors errors_out(const BristleEffects& on) const {
+    return errors_of(judged_, model_.predict(judged_, options_.horizon_s, on), test_.size());
+  }
+  [[nodiscard]] static BristleEffects with(BristleEffects on, std::size_t effect, bool is) {
+    on[effect] = is;
+    return on;
+  }
+  identification::Step& add_step(const char* added, const Errors& errors) {
+    identification::Step& step = *found_.add_steps();
+    step.set_added(added);
+    step.set_rmse_mm(std::sqrt(errors.mean()));
+    return step;
+  }
+  [[nodiscard]] std::optional<std::size_t> best_addition() const;
+  [[nodiscard]] bool is_significant(std::size_t effect, const Errors& errors) const;
+  void reject(std::size_t effect, const char* why);
+  void add_faults();
+  void add_runs();
+  void add_horizon();
+
+  const Options& options_;
+  const std::vector<BristleRun>&train_, &test_;
+  const std::vector<BristleInstant> learned_, judged_;
+  const BristleModel model_;
+  identification::Identification found_;
+  BristleEffects on_ = {};
+  std::vector<BristleEffect> order_;  ///< of the effects in the model
+  Errors now_in_;                     ///< of the model, on the training runs
+  const Errors before_out_;           ///< on held-out runs
+  Errors now_out_;
+};
+
+bool BristleIdentification::is_significant(std::size_t effect, const Errors& errors) const {
+  // The test of drift uses velocities, whether or not it improves predictions.
+  const bool drifting = effect == index_of(BristleEffect::kDrift) && model_.drift_p < kChance / kBristleEffects &&
+                        errors.mean() < now_in_.mean();
+  return drifting || now_in_.mean() - errors.mean() >= kStandardErrors * now_in_.error(&errors);
+}
+
+std::optional<std::size_t> BristleIdentification::best_addition() const {
+  std::optional<std::size_t> best;
+  double best_mean = 0;
+  for (std::size_t e = 0; e < kBristleEffects; ++e) {
+    // Mount offset and axis are only defined once the sense of rotation is known.
+    const bool waits = !on_[index_of(BristleEffect::kSense)] &&
+                       (e == index_of(BristleEffect::kMount) || e == index_of(BristleEffect::kAxis) ||
+                        e == index_of(BristleEffect::kDrift));
+    if (on_[e] || waits) continue;
+    const Errors errors = errors_in(with(on_, e, true));
+    if (!is_significant(e, errors) || (best && errors.mean() >= best_mean)) continue;
+    best = e;
+    best_mean = errors.mean();
+  }
+  return best;
+}
+
+void BristleIdentification::search() {
+  while (const std::optional<std::size_t> best = best_addition()) {
+    on_[*best] = true;
+    order_.push_back(static_cast<BristleEffect>(*best));
+    now_in_ = errors_in(on_);
+    const Errors out = errors_out(on_);
+    add_step(kEffects[*best].name, out).set_held_out_gain(now_out_.mean() - out.mean());
+    now_out_ = out;
+    if (options_.progress) options_.progress(0.2 + 0.1 * static_cast<double>(order_.size()), kEffects[*best].name);
+  }
+}
+
+void BristleIdentification::reject(std::size_t effect, const char* why) {
+  identification::Rejected& rejected = *out().add_rejected();
+  rejected.set_name(kEffects[effect].name);
+  identify::assign(rejected.mutable_covariates(), kEffects[effect].covariates);
+  rejected.set_acts_on(kEffects[effect].acts_on);
+  rejected.set_why(why);
+}
+
+void BristleIdentification::eliminate() {
+  const Folds folds(learned_, options_.horizon_s);
+  for (std::size_t i = order_.size(); i-- > 0;) {
+    const std::size_t e = index_of(order_[i]);
+    const BristleEffects without = with(on_, e, false);
+    if (folds.error(without) > folds.error(on_)) continue;
+    reject(e, "no cross-validated gain on the training runs");
+    on_ = without;
+    order_.erase(order_.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  // The effects together must predict better than none.
+  if (!order_.empty() && !(folds.error(on_) < folds.error(BristleEffects{}))) {
+    for (const BristleEffect effect : order_)
+      reject(index_of(effect), "no cross-validated gain of all effects together on the training runs");
+    on_ = {};
+    order_.clear();
+  }
+  now_in_ = errors_in(on_);
+  now_out_ = errors_out(on_);
+  for (std::size_t e = 0; e < kBristleEffects; ++e) {
+    const auto& rejected = out().rejected();
+    const bool known =
+        std::any_of(rejected.begin(), rejected.end(), [&](const auto& r) { return r.name() == kEffects[e].name; });
+    if (!on_[e] && !known) reject(e, "not significant");
+  }
+}
+
+void BristleIdentification::judge() {
+  *out().mutable_before() = accuracy_of(before_out_);
+  *out().mutable_after() = accuracy_of(now_out_);
+  const double total = before_out_.mean() - now_out_.mean();
+  for (const BristleEffect kind : order_) {
+    const std::size_t e = index_of(kind);
+    const BristleEffects without = with(on_, e, false);
+    const Errors less = errors_out(without), less_in = errors_in(without);
+    const double gain = less.mean() - now_out_.mean();
+    identification::Effect& effect = *out().add_effects();
+    effect.set_name(kEffects[e].name);
+    identify::assign(effect.mutable_covariates(), kEffects[e].covariates);
+    effect.set_acts_on(kEffects[e].acts_on);
+    identification::Evidence& evidence = *effect.mutable_evidence();
+    evidence.set_standard_errors((less_in.mean() - now_in_.mean()) / std::max(less_in.error(&now_in_), 1e-12));
+    *evidence.mutable_held_out_gain() = json_value(gain);
+    *evidence.mutable_held_out_gain_se() = json_value(less.error(&now_out_));
+    if (kind == BristleEffect::kDrift) evidence.set_log10_p(std::log10(std::max(model_.drift_p, 1e-300)));
+    *effect.mutable_parameters() = parameters_of(kind, model_);
+    *effect.mutable_rmse_without_mm() = json_value(std::sqrt(less.mean()));
+    *effect.mutable_share_removed() = json_value(total > 0 ? gain / total : 0);
+    effect.set_in_words(words_of(kind, model_));
+  }
+  if (on_[index_of(BristleEffect::kDrift)]) {
+    identification::Ambiguous& ambiguous = *out().add_ambiguous();
+    ambiguous.set_found("downhill");
+    ambiguous.set_instead("a vibration of the table that moves robots");
+    ambiguous.set_experiment("rotate the table by 180 degrees, or record with the motors off");
+  }
+}
+
+void BristleIdentification::add_faults() {
+  for (const auto* set : {&train_, &test_}) {
+    for (const BristleRun& run : *set) {
+      if (run.dropped * 50 <= run.size()) continue;
+      identification::Fault& fault = *out().add_faults();
+      fault.set_kind("jumps");
+      fault.set_run(run.name);
+      *fault.mutable_robot() = json_value(run.robot);
+      fault.set_in_words(fmt::format("{} of {} rows have positions that the robot cannot have reached", run.dropped,
+                                     run.dropped + run.size()));
+    }
+  }
+}
+
+void BristleIdentification::add_runs() {
+  for (const auto* set : {&train_, &test_}) {
+    for (const BristleSummary& s : summaries_of(model_, *set, set == &train_ ? learned_ : judged_)) {
+      identification::BristleRun& run = *out().add_runs();
+      run.set_run(s.run);
+      run.set_speed_mm_s(s.speed_mm_s);
+      run.set_drift_x_mm_s(s.drift_x_mm_s);
+      run.set_drift_y_mm_s(s.drift_y_mm_s);
+      run.set_turn_rad_s(s.turn_rad_s);
+      run.set_mount_rad(s.mount_rad);
+      run.set_held_out(set == &test_);
+    }
+  }
+}
+
+/// Errors over the horizon for the same runs, with the parameters fitted at one horizon.
+void BristleIdentification::add_horizon() {
+  identification::Horizon& horizon = *found_.mutable_horizon();
+  for (const double ahead_s : {0.25, 0.5, 1.0, 2.0, 3.0, 5.0}) {
+    const std::vector<BristleInstant> instants = instants_of(test_, ahead_s);
+    if (instants.empty()) continue;
+    const auto rmse = [&](const BristleEffects& with) {
+      return std::sqrt(errors_of(instants, model_.predict(instants, ahead_s, with), test_.size()).mean());
+    };
+    horizon.add_at_s(ahead_s);
+    horizon.add_before_mm(rmse(BristleEffects{}));
+    horizon.add_after_mm(rmse(on_));
+    horizon.add_floor_mm(extrapolation_rmse_mm(instants, ahead_s));
+  }
+}
+
+Identified BristleIdentification::result() {
+  out().set_noise_floor_mm(extrapolation_rmse_mm(judged_, options_.horizon_s));
+  out().set_noise_floor_how(
+      "the error of an extrapolation of the last half second, which needs no model; a model may be better");
+  out().set_horizon_s(options_.horizon_s);
+  out().mutable_base()->set_straight_speed_mm_s(model_.speed_mm_s);
+  add_runs();
+  add_faults();
+  add_horizon();
+  *found_.add_covariate_plots() = speed_by_direction(judged_, model_, on_[index_of(BristleEffect::kDrift)]);
+  *found_.add_tables() = table_of_runs(out().runs());
+  found_.mutable_set()->set_runs(static_cast<std::uint32_t>(train_.size() + test_.size()));
+  found_.mutable_set()->set_has_headings(true);
+  found_.mutable_set()->set_has_commands(false);
+
+  Identified identified;
+  identified.model = proto_of(model_, on_);
+  const Places before = model_.predict(judged_, options_.horizon_s, BristleEffects{}),
+               after = model_.predict(judged_, options_.horizon_s, on_);
+  for (std::size_t i = 0; i < judged_.size(); ++i) {
+    const BristleRun& run = test_[judged_[i].run];
+    identified.predictions.push_back(
+        {run.name, run.robot, judged_[i].time_s, before[i].x_mm, before[i].y_mm, after[i].x_mm, after[i].y_mm});
+  }
+  identified.found = std::move(found_);
+  if (options_.progress) options_.progress(1, "done");
+  return identified;
+}
+
+/// Holds out one run in four, and with fewer the last one.
+void hold_out(std::vector<BristleRun>& train, std::vector<BristleRun>& test) {
+  if (train.size() < 2) throw UserError("one run cannot be held out; give at least two runs, or --test DIR");
+  std::vector<BristleRun> kept;
+  const std::size_t first = std::min<std::size_t>(3, train.size() - 1);
+  for (std::size_t r = 0; r < train.size(); ++r) (r % 4 == first ? test : kept).push_back(std::move(train[r]));
+  train = std::move(kept);
+}
+
 }  // namespace
 
 Identified identify_bristle(std::vector<BristleRun> train, std::vector<BristleRun> test, const Options& options) {
-  const auto started = std::chrono::steady_clock::now();
-  if (test.empty()) {
-    if (train.size() < 2) throw UserError("one run cannot be held out; give at least two runs, or --test DIR");
-    std::vector<BristleRun> kept;
-    // One run in four, and with fewer the last one.
-    const std::size_t first = std::min<std::size_t>(3, train.size() - 1);
-    for (std::size_t r = 0; r < train.size(); ++r) (r % 4 == first ? test : kept).push_back(std::move(train[r]));
-    train = std::move(kept);
-  }
-  const double h = options.horizon_s;
-  const std::vector<BristleInstant> learned = instants_of(train, h), judged = instants_of(test, h);
-  if (learned.empty() || judged.empty())
-    throw UserError(fmt::format("no run has {:g} s without a gap; give a shorter --horizon", h + 3));
-  const BristleModel model(learned);
-  const auto errors_on = [&](const std::vector<BristleInstant>& instants, std::size_t runs,
-                             const BristleEffects& on) {
-    return errors_of(instants, model.predict(instants, h, on), runs);
-  };
-
-  // Forward selection: adds the effect with the largest reduction of the cross-validated error, as long as it
-  // exceeds three standard errors over runs. Then less than 1 in 100 sets has a false alarm, over six tests.
-  BristleEffects on{};
-  json effects = json::array(), rejected = json::array(), steps = json::array();
-  std::vector<BristleEffect> order;
-  Errors now = errors_on(learned, train.size(), on), now_out = errors_on(judged, test.size(), on);
-  const Errors before_out = now_out;
-  steps.push_back({{"added", "base"}, {"rmse_mm", std::sqrt(now_out.mean())}});
-  for (bool searching = options.find_effects; searching;) {
-    searching = false;
-    std::size_t best = kBristleEffects;
-    Errors best_errors;
-    for (std::size_t e = 0; e < kBristleEffects; ++e) {
-      // Mount offset and axis are only defined once the sense of rotation is known.
-      const bool waits = !on[0] && (e == static_cast<std::size_t>(BristleEffect::kMount) ||
-                                    e == static_cast<std::size_t>(BristleEffect::kAxis) ||
-                                    e == static_cast<std::size_t>(BristleEffect::kDrift));
-      if (on[e] || waits) continue;
-      BristleEffects with = on;
-      with[e] = true;
-      const Errors errors = errors_on(learned, train.size(), with);
-      // The test of drift uses velocities, whether or not it improves predictions.
-      const bool drifting = e == static_cast<std::size_t>(BristleEffect::kDrift) &&
-                            model.drift_p < kChance / kBristleEffects && errors.mean() < now.mean();
-      if (!drifting && now.mean() - errors.mean() < 3 * now.error(&errors)) continue;
-      if (best == kBristleEffects || errors.mean() < best_errors.mean()) {
-        best = e;
-        best_errors = errors;
-      }
-    }
-    if (best == kBristleEffects) break;
-    BristleEffects with = on;
-    with[best] = true;
-    const Errors out = errors_on(judged, test.size(), with);
-    const double gain = now_out.mean() - out.mean();
-    steps.push_back({{"added", kNames[best]}, {"rmse_mm", std::sqrt(out.mean())}, {"held_out_gain", gain}});
-    on = with;
-    now = best_errors;
-    now_out = out;
-    order.push_back(static_cast<BristleEffect>(best));
-    searching = true;
-    if (options.progress) options.progress(0.2 + 0.1 * static_cast<double>(order.size()), kNames[best]);
-  }
-  // Evaluates each effect by cross-validation.
-  const Folds folds(learned, h);
-  for (std::size_t i = order.size(); i-- > 0;) {
-    const auto e = static_cast<std::size_t>(order[i]);
-    BristleEffects without = on;
-    without[e] = false;
-    if (folds.error(without) > folds.error(on)) continue;
-    rejected.push_back({{"name", kNames[e]},
-                        {"covariates", kCovariates[e]},
-                        {"acts_on", kActsOn[e]},
-                        {"why", "no cross-validated gain on the training runs"}});
-    on = without;
-    now_out = errors_on(judged, test.size(), on);
-    order.erase(order.begin() + static_cast<std::ptrdiff_t>(i));
-  }
-  // The effects together must predict better than none.
-  if (!order.empty() && !(folds.error(on) < folds.error(BristleEffects{}))) {
-    for (const BristleEffect effect : order)
-      rejected.push_back({{"name", kNames[static_cast<std::size_t>(effect)]},
-                          {"covariates", kCovariates[static_cast<std::size_t>(effect)]},
-                          {"acts_on", kActsOn[static_cast<std::size_t>(effect)]},
-                          {"why", "no cross-validated gain of all effects together on the training runs"}});
-    on = {};
-    now_out = before_out;
-    order.clear();
-  }
-  const double total = before_out.mean() - now_out.mean();
-  for (const BristleEffect effect : order) {
-    const auto e = static_cast<std::size_t>(effect);
-    BristleEffects without = on;
-    without[e] = false;
-    const Errors less = errors_on(judged, test.size(), without),
-                 less_in = errors_on(learned, train.size(), without);
-    const double gain_in = less_in.mean() - errors_on(learned, train.size(), on).mean();
-    const Errors with_in = errors_on(learned, train.size(), on);
-    json evidence = {{"standard_errors", gain_in / std::max(less_in.error(&with_in), 1e-12)},
-                     {"held_out_gain", less.mean() - now_out.mean()},
-                     {"held_out_gain_se", less.error(&now_out)}};
-    if (effect == BristleEffect::kDrift) evidence["log10_p"] = std::log10(std::max(model.drift_p, 1e-300));
-    effects.push_back({{"name", kNames[e]},
-                       {"covariates", kCovariates[e]},
-                       {"acts_on", kActsOn[e]},
-                       {"evidence", evidence},
-                       {"parameters", parameters_of(effect, model)},
-                       {"rmse_without_mm", std::sqrt(less.mean())},
-                       {"share_removed", total > 0 ? (less.mean() - now_out.mean()) / total : 0},
-                       {"in_words", words_of(effect, model)}});
-  }
-  for (std::size_t e = 0; e < kBristleEffects; ++e) {
-    const bool refused = !on[e] && std::none_of(rejected.begin(), rejected.end(),
-                                                [&](const json& r) { return r["name"] == kNames[e]; });
-    if (refused)
-      rejected.push_back({{"name", kNames[e]},
-                          {"covariates", kCovariates[e]},
-                          {"acts_on", kActsOn[e]},
-                          {"why", "not significant"}});
-  }
-
-  Identified out;
-  out.model = proto_of(model, on);
-  const Places before = model.predict(judged, h, BristleEffects{}), after = model.predict(judged, h, on);
-  for (std::size_t i = 0; i < judged.size(); ++i) {
-    const BristleRun& run = test[judged[i].run];
-    out.predictions.push_back(
-        {run.name, run.robot, judged[i].time_s, before[i].x_mm, before[i].y_mm, after[i].x_mm, after[i].y_mm});
-  }
-  json faults = json::array();
-  for (const auto* set : {&train, &test}) {
-    for (const BristleRun& run : *set) {
-      if (run.dropped * 50 > run.size())
-        faults.push_back(
-            {{"kind", "jumps"},
-             {"run", run.name},
-             {"robot", run.robot},
-             {"in_words", fmt::format("{} of {} rows have positions that the robot cannot have reached",
-                                      run.dropped, run.dropped + run.size())}});
-    }
-  }
-  json runs = json::array();
-  for (const auto* set : {&train, &test}) {
-    for (const BristleSummary& s : summaries_of(model, *set, set == &train ? learned : judged)) {
-      runs.push_back({{"run", s.run},
-                      {"speed_mm_s", s.speed_mm_s},
-                      {"drift_x_mm_s", s.drift_x_mm_s},
-                      {"drift_y_mm_s", s.drift_y_mm_s},
-                      {"turn_rad_s", s.turn_rad_s},
-                      {"mount_rad", s.mount_rad},
-                      {"held_out", set == &test}});
-    }
-  }
-  json& document = out.document;
-  document["contract"] = {
-      {"before", summary_of(before_out)},
-      {"after", summary_of(now_out)},
-      {"noise_floor_mm", extrapolation_rmse_mm(judged, h)},
-      {"noise_floor_how",
-       "the error of an extrapolation of the last half second, which needs no model; a model may be better"},
-      {"horizon_s", h},
-      {"effects", effects},
-      {"base", {{"straight_speed_mm_s", model.speed_mm_s}}},
-      {"runs", runs},
-      {"rejected", rejected},
-      {"ambiguous",
-       json::array({{{"found", "downhill"},
-                     {"instead", "a vibration of the table that moves robots"},
-                     {"experiment", "rotate the table by 180 degrees, or record with the motors off"}}})},
-      {"faults", faults}};
-  if (!on[static_cast<std::size_t>(BristleEffect::kDrift)]) document["contract"]["ambiguous"] = json::array();
-  // Errors over the horizon for the same runs, with the parameters fitted at one horizon.
-  json& horizon = document["horizon"];
-  for (const char* list : {"at_s", "before_mm", "after_mm", "floor_mm"}) horizon[list] = json::array();
-  for (const double ahead_s : {0.25, 0.5, 1.0, 2.0, 3.0, 5.0}) {
-    const std::vector<BristleInstant> instants = instants_of(test, ahead_s);
-    if (instants.empty()) continue;
-    const auto rmse = [&](const BristleEffects& with) {
-      return std::sqrt(errors_of(instants, model.predict(instants, ahead_s, with), test.size()).mean());
-    };
-    horizon["at_s"].push_back(ahead_s);
-    horizon["before_mm"].push_back(rmse(BristleEffects{}));
-    horizon["after_mm"].push_back(rmse(on));
-    horizon["floor_mm"].push_back(extrapolation_rmse_mm(instants, ahead_s));
-  }
-  document["covariate_plots"] = {
-      speed_by_direction(judged, model, on[static_cast<std::size_t>(BristleEffect::kDrift)])};
-  document["tables"] = {table_of_runs(runs)};
-  document["set"] = {{"runs", train.size() + test.size()}, {"has_headings", true}, {"has_commands", false}};
-  document["steps"] = steps;
-  document["seconds"]["all"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
-  if (options.progress) options.progress(1, "done");
-  return out;
+  if (test.empty()) hold_out(train, test);
+  BristleIdentification identification(train, test, options);
+  if (options.find_effects) identification.search();
+  identification.eliminate();
+  identification.judge();
+  return identification.result();
 }
 
 }  // namespace kilotwin::bristle

@@ -1,5 +1,5 @@
 /// Identification from bristle plate tracks: selects effects of table and tracker, and evaluates predictions on
-/// held-out runs. Returns the document of clients/identify/identify.hpp.
+/// held-out runs.
 #pragma once
 
 #include "clients/identify/bristle/bristle_set.hpp"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "core/math/median.hpp"
+#include "core/stats/quantiles.hpp"
 
 namespace kilotwin::bristle {
 namespace {}  // namespace
@@ -21,14 +21,14 @@ VelocityCircle fit_circle(std::span<const std::complex<double>> velocities, std:
     if (std::abs(v) > 0) directions += v / std::abs(v);
   }
   circle.prior_share = std::abs(directions) / static_cast<double>(velocities.size());
-  double radius = std::max(upper_median(sizes), 1e-9);
+  double radius = std::max(stats::upper_median(sizes), 1e-9);
   std::complex<double> centre = prior_drift * radius;
   // Gauss-Newton on the distances from the circle, with Huber weights beyond 1.5 standard deviations.
   constexpr int kIterations = 15;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     for (std::size_t i = 0; i < velocities.size(); ++i)
       off[i] = std::abs(std::abs(velocities[i] - centre) - radius);
-    const double limit = 1.5 * std::max(1.48 * upper_median(off), 1e-6 * radius);
+    const double limit = 1.5 * std::max(1.48 * stats::upper_median(off), 1e-6 * radius);
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
     Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
     for (const std::complex<double>& v : velocities) {

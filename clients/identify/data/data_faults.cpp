@@ -317,24 +317,4 @@ std::string DataFault::in_words() const {
   return {};
 }
 
-nlohmann::json document_of(const std::vector<DataFault>& faults) {
-  nlohmann::json all = nlohmann::json::array();
-  const auto number = [](const std::optional<std::uint32_t>& n) {
-    return n ? nlohmann::json(*n) : nlohmann::json();
-  };
-  for (const DataFault& f : faults) {
-    all.push_back({{"kind", name_of(f.kind)},
-                   {"set", f.of_test ? "test" : "train"},
-                   {"run", f.run},
-                   {"robot", number(f.robot)},
-                   {"other", number(f.other)},
-                   {"from_s", f.from_s},
-                   {"to_s", f.to_s},
-                   {"strength", f.strength},
-                   {"excluded", f.of_test ? 0 : f.excluded},
-                   {"in_words", f.in_words()}});
-  }
-  return all;
-}
-
 }  // namespace kilotwin::identify

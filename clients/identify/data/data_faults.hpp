@@ -9,7 +9,6 @@
 #pragma once
 
 #include <cstdint>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -43,9 +42,6 @@ struct DataFault {
 /// become empty. Returns the faults by run, then in the order of their kinds. No fault was found in 300 sets
 /// without one (tests/identify).
 std::vector<DataFault> exclude_faults(MeasuredSet&);
-
-/// [{kind, set ("train" or "test"), run, robot, other, from_s, to_s, strength, excluded, in_words}]; robot and other may be null.
-[[nodiscard]] nlohmann::json document_of(const std::vector<DataFault>&);
 
 // The steps of exclude_faults, in its order. Each appends the faults it finds and excludes their samples.
 void exclude_duplicates(MeasuredSet&, std::vector<DataFault>&);

@@ -1,8 +1,6 @@
 /// Filter corrections, sample by sample, as disturbances of the motion: data of the report's plots.
 #pragma once
 
-#include <nlohmann/json.hpp>
-
 #include "clients/identify/fit/fitter.hpp"
 
 namespace kilotwin::identify {
@@ -17,11 +15,5 @@ struct Disturbance {
 
 /// Of all tracks, for driven robots without contacts. The model estimates the initial headings itself.
 [[nodiscard]] std::vector<Disturbance> disturbances_of(const FitState&, std::uint32_t threads);
-
-/// covariate_plots of the result document (identify.hpp).
-[[nodiscard]] nlohmann::json covariate_plots(const std::vector<Disturbance>& before,
-                                             const std::vector<Disturbance>& after);
-/// maps of the result document.
-[[nodiscard]] nlohmann::json maps(const std::vector<Disturbance>& before, const std::vector<Disturbance>& after);
 
 }  // namespace kilotwin::identify

@@ -9,26 +9,29 @@
 namespace kilotwin::kilogrid {
 namespace {
 
-using nlohmann::json;
+using identify::json_list, identify::json_value;
+
+/// Of the statistics "msd".
+constexpr std::array kLags_s = {10, 20, 50, 100, 200, 300, 600};
 
 /// Residual speed of simulated runs over one covariate, mm/s.
-json plot_of(const char* name, const char* covariate, const char* unit, const std::vector<double>& at,
-             const FloorTarget& target, const FloorStatistics& before, const FloorStatistics& after) {
+identification::CovariatePlot plot_of(const char* name, const char* covariate, const char* unit,
+                                      const std::vector<double>& at, const FloorTarget& target,
+                                      const FloorStatistics& before, const FloorStatistics& after) {
   const StatisticGroup& group = statistic_group(name);
-  json plot = {{"target", "forward"},
-               {"covariate", covariate},
-               {"unit", unit},
-               {"acts_on_unit", "mm/s"},
-               {"fitted", nullptr}};
-  for (const char* list : {"at", "before", "before_se", "after"}) plot[list] = json::array();
+  identification::CovariatePlot plot;
+  plot.set_target("forward");
+  plot.set_covariate(covariate);
+  plot.set_unit(unit);
+  plot.set_acts_on_unit("mm/s");
   for (std::size_t i = 0; i < std::min(at.size(), group.size()); ++i) {
     const std::size_t s = group.first + i;
     const double measured = target.statistics().value[s];
     if (!std::isfinite(measured + before.value[s] + after.value[s])) continue;
-    plot["at"].push_back(at[i]);
-    plot["before"].push_back((measured - before.value[s]) / FloorBlocks::kBlock_s);
-    plot["before_se"].push_back(std::sqrt(target.statistics().variance[s]) / FloorBlocks::kBlock_s);
-    plot["after"].push_back((measured - after.value[s]) / FloorBlocks::kBlock_s);
+    plot.add_at(at[i]);
+    plot.add_before((measured - before.value[s]) / FloorBlocks::kBlock_s);
+    plot.add_before_se(std::sqrt(target.statistics().variance[s]) / FloorBlocks::kBlock_s);
+    plot.add_after((measured - after.value[s]) / FloorBlocks::kBlock_s);
   }
   return plot;
 }
@@ -39,63 +42,70 @@ std::vector<double> middles(double first, double step, std::size_t count) {
   return at;
 }
 
-json map_of(const FloorTarget& target, const FloorStatistics& before, const FloorStatistics& after) {
+identification::ResidualMap map_of(const FloorTarget& target, const FloorStatistics& before,
+                                   const FloorStatistics& after) {
   const StatisticGroup& group = statistic_group("step-by-place");
   constexpr std::size_t kColumns = 4;
   const std::size_t rows = group.size() / kColumns;
   const double width = target.floor().width_mm / kColumns,
                height = target.floor().height_mm / static_cast<double>(rows);
-  json map = {{"target", "forward"},
-              {"unit", "mm/s"},
-              {"x_mm", middles(0.5 * width - target.floor().width_mm / 2, width, kColumns)},
-              {"y_mm", middles(0.5 * height - target.floor().height_mm / 2, height, rows)}};
+  identification::ResidualMap map;
+  map.set_target("forward");
+  map.set_unit("mm/s");
+  identify::assign(map.mutable_x_mm(), middles(0.5 * width - target.floor().width_mm / 2, width, kColumns));
+  identify::assign(map.mutable_y_mm(), middles(0.5 * height - target.floor().height_mm / 2, height, rows));
   for (std::size_t r = 0; r < rows; ++r) {
-    json b = json::array(), a = json::array(), n = json::array();
+    identify::JsonList &b = *map.add_before(), &a = *map.add_after();
     for (std::size_t c = 0; c < kColumns; ++c) {
       const std::size_t s = group.first + r * kColumns + c;
       const double measured = target.statistics().value[s];
-      b.push_back((measured - before.value[s]) / FloorBlocks::kBlock_s);
-      a.push_back((measured - after.value[s]) / FloorBlocks::kBlock_s);
-      n.push_back(1);
+      *b.add_values() = json_value((measured - before.value[s]) / FloorBlocks::kBlock_s);
+      *a.add_values() = json_value((measured - after.value[s]) / FloorBlocks::kBlock_s);
     }
-    map["before"].push_back(b);
-    map["after"].push_back(a);
-    map["count"].push_back(n);
   }
   return map;
 }
 
 /// Shares as a histogram of 10 000 counts.
-json distribution_of(const char* name, const char* title, const char* unit, const std::vector<double>& edges,
-                     const FloorTarget& target, const FloorStatistics& simulated) {
+identification::Distribution distribution_of(const char* name, const char* title, const char* unit,
+                                             const std::vector<double>& edges, const FloorTarget& target,
+                                             const FloorStatistics& simulated) {
   const StatisticGroup& group = statistic_group(name);
-  json d = {
-      {"name", title}, {"unit", unit}, {"edges", edges}, {"measured", json::array()}, {"simulated", json::array()}};
+  identification::Distribution d;
+  d.set_name(title);
+  d.set_unit(unit);
+  identify::assign(d.mutable_edges(), edges);
   for (std::size_t s = group.first; s < group.first + group.size(); ++s) {
-    d["measured"].push_back(std::round(10000 * target.statistics().value[s]));
-    d["simulated"].push_back(std::round(10000 * simulated.value[s]));
+    d.add_measured(std::round(10000 * target.statistics().value[s]));
+    d.add_simulated(std::round(10000 * simulated.value[s]));
   }
   return d;
 }
 
 }  // namespace
 
-json numbers(const std::vector<double>& values, const StatisticGroup& group, bool root) {
-  json list = json::array();
-  for (std::size_t s = group.first; s < group.first + group.size(); ++s) {
-    const double v = root ? std::sqrt(values[s]) : values[s];
-    list.push_back(std::isfinite(v) ? json(v) : json());
-  }
+identify::JsonList numbers(const std::vector<double>& values, const StatisticGroup& group, bool root) {
+  identify::JsonList list;
+  for (std::size_t s = group.first; s < group.first + group.size(); ++s)
+    *list.add_values() = json_value(root ? std::sqrt(values[s]) : values[s]);
   return list;
 }
 
-json table_of_motion(const FloorTarget& held_out, const FloorStatistics& before, const FloorStatistics& after) {
-  json rows = json::array();
+identification::Table table_of_motion(const FloorTarget& held_out, const FloorStatistics& before,
+                                      const FloorStatistics& after) {
+  identification::Table table;
+  table.set_id("motion");
+  table.set_title("Statistics of motion, measured and simulated");
+  table.set_lead(
+      "Held-out runs. All statistics use cell reports: mean positions in blocks of 10 s. A step below 16 mm counts "
+      "as rest. Open floor: at least 150 mm from the walls.");
+  identify::assign(table.mutable_head(), std::array{"", "measured", "base model", "with effects"});
   // One row of the table.
   const auto row = [&](const std::string& what, const char* format, const auto& read) {
-    rows.push_back({what, fmt::format(fmt::runtime(format), read(held_out.statistics().value)),
-                    fmt::format(fmt::runtime(format), read(before.value)),
-                    fmt::format(fmt::runtime(format), read(after.value))});
+    std::vector<std::string> cells{what};
+    for (const std::vector<double>* values : {&held_out.statistics().value, &before.value, &after.value})
+      cells.push_back(fmt::format(fmt::runtime(format), read(*values)));
+    *table.add_rows() = json_list(cells);
   };
   const auto value = [&](const char* group, std::size_t i) {
     return [at = statistic_group(group).first + i](const std::vector<double>& v) { return v[at]; };
@@ -107,9 +117,8 @@ json table_of_motion(const FloorTarget& held_out, const FloorStatistics& before,
       return sum;
     };
   };
-  const std::array lags_s = {10, 20, 50, 100, 200, 300, 600};
-  for (std::size_t i = 0; i < lags_s.size(); ++i) {
-    row(fmt::format("root mean square displacement in {} s, mm", lags_s[i]), "{:.0f}",
+  for (std::size_t i = 0; i < kLags_s.size(); ++i) {
+    row(fmt::format("root mean square displacement in {} s, mm", kLags_s[i]), "{:.0f}",
         [&, i](const auto& v) { return std::sqrt(value("msd", i)(v)); });
   }
   // Spread between robots about the common mean. The product of two half runs isolates the persistent part.
@@ -138,38 +147,31 @@ json table_of_motion(const FloorTarget& held_out, const FloorStatistics& before,
     return of(v) / at(v);
   });
   row("share of blocks of 10 s without a report", "{:.3f}", value("reports", 7));
-  return {{"id", "motion"},
-          {"title", "Statistics of motion, measured and simulated"},
-          {"lead",
-           "Held-out runs. All statistics use cell reports: mean positions in blocks of 10 s. A step below 16 mm "
-           "counts "
-           "as rest. Open floor: at least 150 mm from the walls."},
-          {"head", {"", "measured", "base model", "with effects"}},
-          {"rows", rows}};
+  return table;
 }
 
-void add_plots(json& document, const FloorTarget& held_out, const FloorStatistics& before,
+void add_plots(identification::Identification& out, const FloorTarget& held_out, const FloorStatistics& before,
                const FloorStatistics& after) {
   const StatisticGroup& ways = statistic_group("msd");
-  json measured = json::array(), simulated = json::array(), lags = json::array();
-  for (std::size_t s = 0; s < ways.size(); ++s) {
-    measured.push_back(held_out.statistics().value[ways.first + s]);
-    simulated.push_back(after.value[ways.first + s]);
-    lags.push_back(std::array{10, 20, 50, 100, 200, 300, 600}[s]);
-  }
-  document["msd"] = {{"lag_s", lags}, {"measured_mm2", measured}, {"simulated_mm2", simulated}};
+  identification::Msd& msd = *out.mutable_msd();
+  for (std::size_t s = 0; s < ways.size(); ++s) msd.add_lag_s(kLags_s[s]);
+  *msd.mutable_measured_mm2() = numbers(held_out.statistics().value, ways, false);
+  *msd.mutable_simulated_mm2() = numbers(after.value, ways, false);
   const double pi = 3.14159265358979;
-  document["covariate_plots"] = {
-      plot_of("step-by-time", "time", "s", middles(150, 300, 16), held_out, before, after),
-      plot_of("step-by-wall", "position", "mm from the wall", {20, 45, 55, 67, 87, 125, 175, 250, 400}, held_out,
-              before, after),
-      plot_of("step-by-neighbours", "neighbours", "within 100 mm", middles(0, 1, 5), held_out, before, after),
-      plot_of("step-by-direction", "heading", "rad", middles(-7 * pi / 8, pi / 4, 8), held_out, before, after)};
-  document["maps"] = {map_of(held_out, before, after)};
-  document["distributions"] = {
+  const auto add_plot = [&](const char* name, const char* covariate, const char* unit,
+                            const std::vector<double>& at) {
+    *out.add_covariate_plots() = plot_of(name, covariate, unit, at, held_out, before, after);
+  };
+  add_plot("step-by-time", "time", "s", middles(150, 300, 16));
+  add_plot("step-by-wall", "position", "mm from the wall", {20, 45, 55, 67, 87, 125, 175, 250, 400});
+  add_plot("step-by-neighbours", "neighbours", "within 100 mm", middles(0, 1, 5));
+  add_plot("step-by-direction", "heading", "rad", middles(-7 * pi / 8, pi / 4, 8));
+  *out.add_maps() = map_of(held_out, before, after);
+  *out.add_distributions() =
       distribution_of("step", "displacement in 10 s", "mm",
-                      {0, 8, 16, 24, 32, 40, 50, 60, 70, 80, 90, 100, 110, 120, 150, 200}, held_out, after),
-      distribution_of("turn", "turn between displacements of 10 s", "rad", middles(0, pi / 8, 9), held_out, after)};
+                      {0, 8, 16, 24, 32, 40, 50, 60, 70, 80, 90, 100, 110, 120, 150, 200}, held_out, after);
+  *out.add_distributions() =
+      distribution_of("turn", "turn between displacements of 10 s", "rad", middles(0, pi / 8, 9), held_out, after);
 }
 
 }  // namespace kilotwin::kilogrid

@@ -107,6 +107,21 @@ FloorBox box_of(const FloorModel& all, std::size_t in_model) {
   return box;
 }
 
+std::string in_words(const Selection& choice, const std::vector<FloorTerm>& candidates) {
+  std::string tried;
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    const CandidateScore& score = choice.scores[c];
+    tried += fmt::format(" {} {:.0f}/{:.0f}", candidates[c].name, score.gain, score.needed);
+    for (std::size_t r = 0; r < score.by_run.size(); ++r)
+      tried += fmt::format("{}{:.0f}", r == 0 ? " (" : " ", score.by_run[r]);
+    if (!score.by_run.empty()) tried += ")";
+  }
+  return fmt::format(
+      "misfit {:.0f} ({:.0f} in simulated sets, {} statistics, unexplained factor {:.1f}); reduction/bound "
+      "(reduction per held-out run):{}",
+      choice.misfit, choice.by_chance, choice.numbers, choice.unexplained, tried);
+}
+
 }  // namespace
 
 bool CandidateScore::helps_held_out() const {
@@ -185,7 +200,6 @@ Selection choose(const FloorModel& model, const std::vector<FloorTerm>& candidat
     others.emplace_back(FloorSet(std::move(rest)), here([r](std::size_t i) { return i != r; }), slopes,
                         correlation);
   }
-  std::string tried;
   const auto better = [&](const CandidateScore& a, const CandidateScore& b) {
     if (a.beyond(choice.bound) != b.beyond(choice.bound)) return a.beyond(choice.bound);
     return a.helps_held_out() != b.helps_held_out() ? a.helps_held_out() : a.evidence > b.evidence;
@@ -205,15 +219,8 @@ Selection choose(const FloorModel& model, const std::vector<FloorTerm>& candidat
       score.by_run.push_back(gain_of_other(others[r], alone[r], of, c, box));
     if (score.consistent_over_runs()) score.needed = chance.gain_of(c, choice.bound);
     if (better(score, choice.scores[choice.best])) choice.best = c;
-    tried += fmt::format(" {} {:.0f}/{:.0f}", candidates[c].name, score.gain, score.needed);
-    for (std::size_t r = 0; r < score.by_run.size(); ++r)
-      tried += fmt::format("{}{:.0f}", r == 0 ? " (" : " ", score.by_run[r]);
-    if (!score.by_run.empty()) tried += ")";
   }
-  progress(fmt::format(
-      "misfit {:.0f} ({:.0f} in simulated sets, {} statistics, unexplained factor {:.1f}); reduction/bound "
-      "(reduction per held-out run):{}",
-      choice.misfit, choice.by_chance, choice.numbers, choice.unexplained, tried));
+  progress(in_words(choice, candidates));
   return choice;
 }
 

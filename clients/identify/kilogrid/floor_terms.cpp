@@ -70,52 +70,8 @@ void add_harmonic(Function& function, double cosine, double sine, double period)
   function.mutable_harmonic()->set_period(period);
 }
 
-}  // namespace
-
-FloorTerm base_term() {
-  FloorTerm term{"base", {}, "", "", "", {}, 0, {}};
-  term.parameters = {{"straight_speed_mm_s", 11.5, 3, 20, 1.2},
-                     {"turn_speed_mm_s", 19, 5, 40, 3},
-                     {"bias_sd_mm_s", 1.2, 0.05, 4, 0.4},
-                     {"factor_variance_s", 0.06, 0, 2, 0.06},
-                     {"range_mm", 47, 35, 70, 2},
-                     {"heard", 0.97, 0.1, 1, 0.08},
-                     {"heard_sd", 0.12, 0, 0.5, 0.06},
-                     {"wall_range_mm", 52, 20, 75, 3},
-                     {"wall_heard", 3.5, 0.3, 7, 1},
-                     {"wall_noise", 4, 0.5, 60, 3},
-                     {"while_talking", 0.15, 0.01, 1, 0.06},
-                     {"same_cell", 0.12, 0.02, 0.5, 0.04},
-                     {"in_turn", 0.6, 0, 1, 0.1},
-                     {"blur_mm", 2, 0.5, 12, 1},
-                     {"silent_s", 300, 30, 2000, 60},
-                     {"talking_s", 225, 20, 2000, 50}};
-  term.apply = [](std::span<const double> v, FloorSettings& s) {
-    proto::Motion& motion = *s.model.mutable_motion();
-    motion.set_straight_speed_mm_s(v[0]);
-    motion.set_turn_speed_mm_s(v[1]);
-    motion.set_bias_mean_mm_s(0);
-    motion.set_bias_sd_mm_s(v[2]);
-    motion.set_factor_variance_s(v[3]);
-    s.radio.range_mm = v[4];
-    s.radio.heard = v[5];
-    s.radio.heard_sd = v[6];
-    s.radio.wall_range_mm = v[7];
-    s.radio.wall_heard = v[8];
-    s.radio.wall_noise = v[9];
-    s.radio.while_talking = v[10];
-    for (std::size_t i = 1; i < 4; ++i) s.radio.later[i] *= 4 * (1 - v[11]) / 3;
-    s.radio.later[0] = v[11];
-    s.radio.in_turn = v[12];
-    s.radio.blur_mm = v[13];
-    s.radio.silent_s = v[14];
-    s.radio.talking_s = v[15];
-  };
-  return term;
-}
-
-std::vector<FloorTerm> candidate_terms(const Floor& floor) {
-  std::vector<FloorTerm> terms;
+/// Robots that differ from each other.
+void add_terms_of_robots(std::vector<FloorTerm>& terms) {
   terms.push_back({"speed-of-robots",
                    {"robot"},
                    "WHEEL_GAIN",
@@ -142,6 +98,10 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
                    {{"sd_rad_s", 0, 0, 0.4, 0.05}, {"tail", 0.1, 0, 0.5, 0.1}},
                    1,
                    [](std::span<const double> v, FloorSettings& s) { add_turning(s, v[0], v[1]); }});
+}
+
+/// Noise with a memory, and episodes at rest.
+void add_terms_of_history(const Floor& floor, std::vector<FloorTerm>& terms) {
   terms.push_back({"wandering-turn",
                    {"history"},
                    "TURN_RATE",
@@ -190,6 +150,9 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
                        set_episodes(add_function(effect, Function::NOTHING), v);
                      }
                    }});
+}
+
+void add_terms_of_time_and_place(const Floor& floor, std::vector<FloorTerm>& terms) {
   terms.push_back(
       {"slowing",
        {"time"},
@@ -247,6 +210,10 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
          add_harmonic(add_function(add_effect(s, "slope-y", Effect::WHEEL_GAIN), Function::Y), 0, v[1],
                       2 * floor.height_mm);
        }});
+}
+
+/// Directions of the arena.
+void add_terms_of_direction(const Floor& floor, std::vector<FloorTerm>& terms) {
   terms.push_back({"grain",
                    {"heading", "world_frame"},
                    "WHEEL_GAIN",
@@ -288,6 +255,9 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
          effect.set_direction_deg(90);
          add_harmonic(add_function(effect, Function::Y), 0, -v[1], 2 * floor.height_mm);
        }});
+}
+
+void add_terms_of_commands(std::vector<FloorTerm>& terms) {
   terms.push_back({"slow-start",
                    {"time_since_command"},
                    "WHEEL_GAIN",
@@ -315,6 +285,59 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
                      effect.add_during(proto::STRAIGHT);
                      add_function(effect, Function::NOTHING).set_constant(v[0]);
                    }});
+}
+
+}  // namespace
+
+FloorTerm base_term() {
+  FloorTerm term{"base", {}, "", "", "", {}, 0, {}};
+  term.parameters = {{"straight_speed_mm_s", 11.5, 3, 20, 1.2},
+                     {"turn_speed_mm_s", 19, 5, 40, 3},
+                     {"bias_sd_mm_s", 1.2, 0.05, 4, 0.4},
+                     {"factor_variance_s", 0.06, 0, 2, 0.06},
+                     {"range_mm", 47, 35, 70, 2},
+                     {"heard", 0.97, 0.1, 1, 0.08},
+                     {"heard_sd", 0.12, 0, 0.5, 0.06},
+                     {"wall_range_mm", 52, 20, 75, 3},
+                     {"wall_heard", 3.5, 0.3, 7, 1},
+                     {"wall_noise", 4, 0.5, 60, 3},
+                     {"while_talking", 0.15, 0.01, 1, 0.06},
+                     {"same_cell", 0.12, 0.02, 0.5, 0.04},
+                     {"in_turn", 0.6, 0, 1, 0.1},
+                     {"blur_mm", 2, 0.5, 12, 1},
+                     {"silent_s", 300, 30, 2000, 60},
+                     {"talking_s", 225, 20, 2000, 50}};
+  term.apply = [](std::span<const double> v, FloorSettings& s) {
+    proto::Motion& motion = *s.model.mutable_motion();
+    motion.set_straight_speed_mm_s(v[0]);
+    motion.set_turn_speed_mm_s(v[1]);
+    motion.set_bias_mean_mm_s(0);
+    motion.set_bias_sd_mm_s(v[2]);
+    motion.set_factor_variance_s(v[3]);
+    s.radio.range_mm = v[4];
+    s.radio.heard = v[5];
+    s.radio.heard_sd = v[6];
+    s.radio.wall_range_mm = v[7];
+    s.radio.wall_heard = v[8];
+    s.radio.wall_noise = v[9];
+    s.radio.while_talking = v[10];
+    for (std::size_t i = 1; i < 4; ++i) s.radio.later[i] *= 4 * (1 - v[11]) / 3;
+    s.radio.later[0] = v[11];
+    s.radio.in_turn = v[12];
+    s.radio.blur_mm = v[13];
+    s.radio.silent_s = v[14];
+    s.radio.talking_s = v[15];
+  };
+  return term;
+}
+
+std::vector<FloorTerm> candidate_terms(const Floor& floor) {
+  std::vector<FloorTerm> terms;
+  add_terms_of_robots(terms);
+  add_terms_of_history(floor, terms);
+  add_terms_of_time_and_place(floor, terms);
+  add_terms_of_direction(floor, terms);
+  add_terms_of_commands(terms);
   return terms;
 }
 

@@ -4,12 +4,11 @@
 #include <cmath>
 
 #include "clients/identify/kilogrid/floor_classifier.hpp"
+#include "clients/identify/result/values.hpp"
 #include "core/os/worker_pool.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
-
-using nlohmann::json;
 
 /// Robots per held-out run with predictions, and particles.
 constexpr std::size_t kPredictedRobots = 6, kParticles = 80;
@@ -25,8 +24,13 @@ struct MeanArea {
   }
   [[nodiscard]] double value() const { return count > 0 ? sum / count : 0.5; }
   [[nodiscard]] double sd() const { return count > 0 ? std::sqrt(variance) / count : 0; }
-  [[nodiscard]] json document() const {
-    return {{"area", value()}, {"low", value() - 1.96 * sd()}, {"high", value() + 1.96 * sd()}, {"pairs", count}};
+  [[nodiscard]] identification::Area area() const {
+    identification::Area out;
+    out.set_area(value());
+    out.set_low(value() - 1.96 * sd());
+    out.set_high(value() + 1.96 * sd());
+    out.set_pairs(count);
+    return out;
   }
 };
 
@@ -35,6 +39,15 @@ double area_of_feature(const std::vector<TrackWindow>& a, const std::vector<Trac
   for (const TrackWindow& w : a) of_a.push_back(w.feature[feature]);
   for (const TrackWindow& w : b) of_b.push_back(w.feature[feature]);
   return area_under_curve(of_a, of_b);
+}
+
+/// Mean over held-out runs, each against its simulation.
+double mean_area_of_feature(const std::vector<std::vector<TrackWindow>>& measured,
+                            const std::vector<std::vector<TrackWindow>>& simulated, std::size_t feature) {
+  double mean = 0;
+  for (std::size_t i = 0; i < simulated.size(); ++i)
+    mean += area_of_feature(measured[i], simulated[i], feature) / static_cast<double>(simulated.size());
+  return mean;
 }
 
 }  // namespace
@@ -68,23 +81,25 @@ Validation validate(const std::vector<FloorRun>& runs, const Floor& floor, const
   return judged;
 }
 
-json summary_of(const Validation& judged) {
+identification::Accuracy accuracy_of(const Validation& judged) {
   const auto n = static_cast<double>(std::max<std::size_t>(judged.rows, 1));
   const double mean = judged.sum / n;
   double spread = 0;
   for (const auto& [sum, count] : judged.by_robot) spread += (sum - mean * count) * (sum - mean * count);
   const double half = 1.96 * std::sqrt(spread) / n;
-  return {{"rmse_mm", judged.rmse_mm()},
-          {"rmse_low_mm", std::sqrt(std::max(mean - half, 0.0))},
-          {"rmse_high_mm", std::sqrt(mean + half)},
-          {"rows", judged.rows},
-          {"log_likelihood_per_report",
-           judged.log_likelihood / static_cast<double>(std::max<std::size_t>(judged.reports, 1))}};
+  identification::Accuracy out;
+  *out.mutable_rmse_mm() = identify::json_value(judged.rmse_mm());
+  out.set_rmse_low_mm(std::sqrt(std::max(mean - half, 0.0)));
+  out.set_rmse_high_mm(std::sqrt(mean + half));
+  out.set_rows(static_cast<std::uint32_t>(judged.rows));
+  out.set_log_likelihood_per_report(judged.log_likelihood /
+                                    static_cast<double>(std::max<std::size_t>(judged.reports, 1)));
+  return out;
 }
 
-json classify(const std::vector<FloorRun>& alike, const std::vector<FloorRun>& unlike,
-              const std::vector<FloorRun>& test, const FloorTarget& held_out, const FloorSettings& before,
-              const FloorSettings& after) {
+identification::Classifier classify(const std::vector<FloorRun>& alike, const std::vector<FloorRun>& unlike,
+                                    const std::vector<FloorRun>& test, const FloorTarget& held_out,
+                                    const FloorSettings& before, const FloorSettings& after) {
   const Floor& floor = held_out.floor();
   std::vector<std::vector<TrackWindow>> measured, by_before, by_after;
   for (const auto* runs : {&test, &alike, &unlike}) {
@@ -108,6 +123,7 @@ json classify(const std::vector<FloorRun>& alike, const std::vector<FloorRun>& u
   os::in_parallel(pairs.size(), held_out.threads(),
                   [&](std::size_t i) { pairs[i].result = classifier_test(*pairs[i].a, *pairs[i].b); });
 
+  identification::Classifier out;
   MeanArea all_days, days_alike, mean_before, mean_after;
   const std::size_t like_others = runs + alike.size();
   for (std::size_t i = 0, p = 0; i < measured.size(); ++i) {
@@ -116,35 +132,31 @@ json classify(const std::vector<FloorRun>& alike, const std::vector<FloorRun>& u
       if (i < runs && j < like_others) days_alike.add(pairs[p].result);
     }
   }
-  json each = json::array(), features = json::array();
   for (std::size_t i = 0; i < runs; ++i) {
     const ClassifierResult &b = pairs[days + i].result, &a = pairs[days + runs + i].result;
     mean_before.add(b);
     mean_after.add(a);
-    each.push_back({{"run", test[i].name},
-                    {"before", b.best()},
-                    {"after", a.best()},
-                    {"after_logistic", a.logistic},
-                    {"after_boosted", a.boosted},
-                    {"after_se", a.best_sd()}});
+    identification::ClassifiedRun& run = *out.add_runs();
+    run.set_run(test[i].name);
+    run.set_before(b.best());
+    run.set_after(a.best());
+    run.set_after_logistic(a.logistic);
+    run.set_after_boosted(a.boosted);
+    run.set_after_se(a.best_sd());
   }
+  *out.mutable_measured_days() = all_days.area();
+  *out.mutable_measured_days_held_out() = days_alike.area();
+  *out.mutable_before() = mean_before.area();
+  *out.mutable_after() = mean_after.area();
+  out.set_above_measured_days(mean_after.value() - all_days.value());
+  out.set_above_measured_days_se(std::hypot(mean_after.sd(), all_days.sd()));
   for (std::size_t f = 0; f < feature_names().size(); ++f) {
-    double b = 0, a = 0;
-    for (std::size_t i = 0; i < runs; ++i) {
-      b += area_of_feature(measured[i], by_before[i], f) / static_cast<double>(runs);
-      a += area_of_feature(measured[i], by_after[i], f) / static_cast<double>(runs);
-    }
-    features.push_back({{"name", feature_names()[f]}, {"before", b}, {"after", a}});
+    identification::ClassifierFeature& feature = *out.add_features();
+    feature.set_name(feature_names()[f]);
+    feature.set_before(mean_area_of_feature(measured, by_before, f));
+    feature.set_after(mean_area_of_feature(measured, by_after, f));
   }
-  const double off = mean_after.value() - all_days.value();
-  return {{"measured_days", all_days.document()},
-          {"measured_days_held_out", days_alike.document()},
-          {"before", mean_before.document()},
-          {"after", mean_after.document()},
-          {"above_measured_days", off},
-          {"above_measured_days_se", std::hypot(mean_after.sd(), all_days.sd())},
-          {"runs", each},
-          {"features", features}};
+  return out;
 }
 
 }  // namespace kilotwin::kilogrid

@@ -1,13 +1,13 @@
 /// Validation on held-out runs: cell predictions, and the classifier two-sample test.
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "clients/identify/kilogrid/cell_filter.hpp"
 #include "clients/identify/kilogrid/floor_target.hpp"
+#include "idl/identification.pb.h"
 
 namespace kilotwin::kilogrid {
 
@@ -29,13 +29,14 @@ struct Predicted {
 [[nodiscard]] Validation validate(const std::vector<FloorRun>& runs, const Floor&, const FloorSettings&,
                                   double horizon_s, std::vector<Predicted>* all);
 /// rmse_mm with its 95 % interval over robots, rows, log_likelihood_per_report.
-[[nodiscard]] nlohmann::json summary_of(const Validation&);
+[[nodiscard]] identification::Accuracy accuracy_of(const Validation&);
 
 /// Areas under the ROC curve, with 95 % intervals over robots: simulated against measured held-out runs, and
 /// measured runs of different days against each other; also for each single feature. `alike`: training runs that
 /// resemble the others.
-[[nodiscard]] nlohmann::json classify(const std::vector<FloorRun>& alike, const std::vector<FloorRun>& unlike,
-                                      const std::vector<FloorRun>& test, const FloorTarget& held_out,
-                                      const FloorSettings& before, const FloorSettings& after);
+[[nodiscard]] identification::Classifier classify(const std::vector<FloorRun>& alike,
+                                                  const std::vector<FloorRun>& unlike,
+                                                  const std::vector<FloorRun>& test, const FloorTarget& held_out,
+                                                  const FloorSettings& before, const FloorSettings& after);
 
 }  // namespace kilotwin::kilogrid

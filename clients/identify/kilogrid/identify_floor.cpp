@@ -4,19 +4,20 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 
 #include "clients/identify/kilogrid/floor_plots.hpp"
 #include "clients/identify/kilogrid/floor_search.hpp"
 #include "clients/identify/kilogrid/floor_validation.hpp"
+#include "clients/identify/result/values.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
 
-using identify::Identified, identify::Options;
-using nlohmann::json;
+using identify::Identified, identify::Options, identify::assign;
+using JsonFields = google::protobuf::Map<std::string, identify::JsonValue>;
+using identify::json_list, identify::json_null, identify::json_value;
 
 std::string words_of(const FloorModel& model, std::size_t term) {
   const double* v = model.values.data() + model.first_of(term);
@@ -51,247 +52,346 @@ std::vector<std::string> covariates_of(const FloorModel& model, std::size_t effe
                                          : std::vector<std::string>{"position"};
 }
 
-json faults_of(const std::vector<FloorRun>& train, const std::vector<FloorRun>& test) {
-  json faults = json::array();
-  for (const auto* set : {&train, &test}) {
-    for (const FloorRun& run : *set) {
-      for (const FloorFault& fault : run.faults) {
-        faults.push_back({{"kind", fault.reason.starts_with("in two") ? "duplicated" : "silent"},
-                          {"run", run.name},
-                          {"robot", fault.robot},
-                          {"in_words", fmt::format("{}, robot {}: {}", run.name, fault.robot, fault.reason)}});
-      }
+void add_faults(identification::Result& result, const std::vector<FloorRun>& runs) {
+  for (const FloorRun& run : runs) {
+    for (const FloorFault& found : run.faults) {
+      identification::Fault& fault = *result.add_faults();
+      fault.set_kind(found.reason.starts_with("in two") ? "duplicated" : "silent");
+      fault.set_run(run.name);
+      *fault.mutable_robot() = json_value(found.robot);
+      fault.set_in_words(fmt::format("{}, robot {}: {}", run.name, found.robot, found.reason));
     }
   }
-  return faults;
 }
 
 /// Texts of the report in place of trajectory errors.
-void add_words(json& document, const json& classifier) {
-  const auto area = [&](const char* of, const char* what) { return classifier.at(of).at(what).get<double>(); };
-  const auto bar = [&](const char* kind, const char* name, const char* of) {
-    return json{{"kind", kind},
-                {"name", name},
-                {"value", area(of, "area")},
-                {"low", area(of, "low")},
-                {"high", area(of, "high")},
-                {"unit", ""},
-                {"from", 0.5}};
+void add_words(identification::Identification& found) {
+  const identification::Classifier& classifier = found.result().classifier();
+  const auto add_bar = [&](const char* kind, const char* name, const identification::Area& area) {
+    identification::Bar& bar = *found.add_bars();
+    bar.set_kind(kind);
+    bar.set_name(name);
+    bar.set_value(area.area());
+    bar.set_low(area.low());
+    bar.set_high(area.high());
+    bar.set_from(0.5);
   };
-  document["bars"] = {bar("before", "base model", "before"), bar("after", "with effects", "after"),
-                      bar("floor", "measured days", "measured_days")};
-  document["verdict"] = fmt::format(
+  const identification::Area &before = classifier.before(), &after = classifier.after(),
+                             &days = classifier.measured_days();
+  add_bar("before", "base model", before);
+  add_bar("after", "with effects", after);
+  add_bar("floor", "measured days", days);
+  found.set_verdict(fmt::format(
       "Classifier two-sample test: measured (held-out days) against simulated windows of 200 s. The area under the "
-      "ROC curve is 0.5 at chance level. It is {:.3f} for the base model and, for the model with "
-      "effects "
-      "with {:.3f} ({:.3f} to {:.3f}). Measured days against each other: {:.3f}.",
-      area("before", "area"), area("after", "area"), area("after", "low"), area("after", "high"),
-      area("measured_days", "area"));
-  document["summary"] = {
+      "ROC curve is 0.5 at chance level. It is {:.3f} for the base model and, for the model with effects, {:.3f} "
+      "({:.3f} to {:.3f}). Measured days against each other: {:.3f}.",
+      before.area(), after.area(), after.low(), after.high(), days.area()));
+  found.add_summary(
       fmt::format("area under the ROC curve, simulated against measured held-out runs: {:.3f} before, {:.3f} after "
                   "({:.3f} to {:.3f}); measured days against each other {:.3f}",
-                  area("before", "area"), area("after", "area"), area("after", "low"), area("after", "high"),
-                  area("measured_days", "area"))};
-  json rows = json::array();
-  for (const json& feature : classifier.at("features"))
-    rows.push_back({feature.at("name"), fmt::format("{:.3f}", feature.at("before").get<double>()),
-                    fmt::format("{:.3f}", feature.at("after").get<double>())});
-  document["tables"].push_back({{"id", "features"},
-                                {"title", "Differences between simulated and measured robots"},
-                                {"lead",
-                                 "Area under the ROC curve of each single feature on held-out runs: 0.5 is chance "
-                                 "level. Above it, the feature "
-                                 "is larger in simulated runs, below it smaller."},
-                                {"head", {"feature of 200 s", "base model", "with effects"}},
-                                {"rows", rows}});
+                  before.area(), after.area(), after.low(), after.high(), days.area()));
+  identification::Table& table = *found.add_tables();
+  table.set_id("features");
+  table.set_title("Differences between simulated and measured robots");
+  table.set_lead(
+      "Area under the ROC curve of each single feature on held-out runs: 0.5 is chance level. Above it, the "
+      "feature "
+      "is larger in simulated runs, below it smaller.");
+  for (const char* head : {"feature of 200 s", "base model", "with effects"}) table.add_head(head);
+  for (const identification::ClassifierFeature& feature : classifier.features())
+    *table.add_rows() = json_list(std::array{feature.name(), fmt::format("{:.3f}", feature.before()),
+                                             fmt::format("{:.3f}", feature.after())});
+}
+
+/// A model on the held-out runs.
+struct JudgedModel {
+  Validation cells;
+  FloorStatistics statistics;
+  double misfit;
+};
+
+/// One identification, in the order of its public functions.
+class FloorIdentification {
+ public:
+  FloorIdentification(const std::vector<FloorRun>& train, const std::vector<FloorRun>& test, const Options& options)
+      : options_(options),
+        test_(test),
+        learned_(without_unlike_runs(train, test), floor_, options.threads),
+        held_out_(test, floor_, options.threads) {}
+
+  void fit_base();
+  void search();
+  /// Errors of both models, and of the model without each effect.
+  void judge();
+  void compare_with_days();
+  [[nodiscard]] Identified result();
+
+ private:
+  [[nodiscard]] identification::Result& out() { return *found_.mutable_result(); }
+  void say(const std::string& what) const {
+    if (options_.progress) options_.progress(part_, what);
+  }
+  [[nodiscard]] FloorProgress progress() const {
+    return [this](const std::string& what) { say(what); };
+  }
+  std::vector<FloorRun> without_unlike_runs(const std::vector<FloorRun>& train, const std::vector<FloorRun>& test);
+  void note(const std::string& added, const FloorModel& model);
+  [[nodiscard]] JudgedModel judged(const FloorModel& model, std::uint64_t seed, std::vector<Predicted>& to) const;
+  [[nodiscard]] identification::Effect judged_effect(std::size_t e);
+  void add_parameters(std::size_t e, JsonFields& parameters) const;
+  void add_ambiguities();
+  void add_statistics();
+  void add_base();
+
+  const Options& options_;
+  const std::vector<FloorRun>& test_;
+  const Floor floor_;
+  identification::Identification found_;
+  double part_ = 0;  ///< completed share
+  std::vector<FloorRun> alike_, unlike_;
+  const FloorTarget learned_, held_out_;
+  FloorModel base_, model_;
+  std::vector<EffectGain> gains_;
+  std::vector<Predicted> by_base_, by_model_;
+  JudgedModel before_ = {}, after_ = {};
+};
+
+/// An unlike day is reported and excluded from the fit: its conditions need not recur.
+std::vector<FloorRun> FloorIdentification::without_unlike_runs(const std::vector<FloorRun>& train,
+                                                               const std::vector<FloorRun>& test) {
+  add_faults(out(), train);
+  add_faults(out(), test);
+  const std::vector<UnlikeRun> unlikes = unlike_runs(train, floor_);
+  for (std::size_t r = 0; r < train.size(); ++r) {
+    const auto is = std::find_if(unlikes.begin(), unlikes.end(), [&](const UnlikeRun& u) { return u.run == r; });
+    (is == unlikes.end() ? alike_ : unlike_).push_back(train[r]);
+    if (is == unlikes.end()) continue;
+    identification::Fault& fault = *out().add_faults();
+    fault.set_kind("unlike");
+    fault.set_run(train[r].name);
+    fault.set_in_words(
+        fmt::format("{}: the robots behaved differently from those of the other runs ({}: {:.3g} "
+                    "against {:.3g}); the run is excluded from the fit",
+                    train[r].name, is->worst, is->value, is->others));
+    say(fmt::format("{} is unlike the other runs", train[r].name));
+  }
+  return alike_;
+}
+
+void FloorIdentification::note(const std::string& added, const FloorModel& model) {
+  const double misfit = held_out_.misfit(simulated_statistics(held_out_, model.settings(), 4711));
+  identification::Step& step = *found_.add_steps();
+  step.set_added(added);
+  step.set_held_out_misfit(misfit);
+  say(fmt::format("{}: misfit on held-out runs {:.0f}, {} statistics", added, misfit, held_out_.size()));
+}
+
+void FloorIdentification::fit_base() {
+  part_ = 0.02;
+  base_.add(base_term());
+  fit_from_far_start(base_, learned_, 1, progress());
+  fit(base_, learned_, 2, 1, 1, progress());
+  model_ = base_;
+  note("base", base_);
+}
+
+void FloorIdentification::search() {
+  const double from = 0.15, to = 0.85;
+  FloorFound found = search_effects(
+      base_, learned_, candidate_terms(floor_),
+      [&](double done, const std::string& what) {
+        part_ = from + (to - from) * done;
+        say(what);
+      },
+      [&](const std::string& added, const FloorModel& model) { note(added, model); });
+  model_ = std::move(found.model);
+  gains_ = std::move(found.gains);
+  for (const RejectedEffect& effect : found.rejected) {
+    identification::Rejected& rejected = *out().add_rejected();
+    rejected.set_name(effect.gain.name);
+    assign(rejected.mutable_covariates(), effect.covariates);
+    rejected.set_acts_on(effect.acts_on);
+    rejected.set_misfit_gain(effect.gain.gain);
+    rejected.set_misfit_gain_needed(effect.gain.needed);
+    rejected.set_why(effect.why);
+  }
+}
+
+JudgedModel FloorIdentification::judged(const FloorModel& model, std::uint64_t seed,
+                                        std::vector<Predicted>& to) const {
+  JudgedModel out{validate(test_, floor_, model.settings(), options_.horizon_s, &to),
+                  simulated_statistics(held_out_, model.settings(), seed, 2), 0};
+  out.misfit = held_out_.misfit(out.statistics);
+  return out;
+}
+
+void FloorIdentification::add_parameters(std::size_t e, JsonFields& parameters) const {
+  if (name_of(model_, e) == kWallEffect) {
+    parameters["form"] = json_value("steps");
+    parameters["beside_mm"] = json_value(FloorModel::kBeside_mm);
+    parameters["part_of_speed"] = json_value(json_list(*model_.wall));
+    return;
+  }
+  const std::vector<FloorParameter>& all = model_.terms[e + 1].parameters;
+  parameters["form"] = json_value("record of the model");
+  for (std::size_t p = 0; p < all.size(); ++p)
+    parameters[all[p].name] = json_value(model_.values[model_.first_of(e + 1) + p]);
+}
+
+identification::Effect FloorIdentification::judged_effect(std::size_t e) {
+  const FloorModel less = without(model_, e);
+  const std::string name = name_of(model_, e);
+  const bool is_wall = name == kWallEffect;
+  const double misfit = held_out_.misfit(simulated_statistics(held_out_, less.settings(), 79));
+  const Validation lesser = validate(test_, floor_, less.settings(), options_.horizon_s, nullptr);
+  const double gain_nat = after_.cells.log_likelihood - lesser.log_likelihood;
+  identification::Effect effect;
+  effect.set_name(name);
+  assign(effect.mutable_covariates(), covariates_of(model_, e));
+  effect.set_acts_on(is_wall ? "WHEEL_GAIN" : model_.terms[e + 1].acts_on);
+  identification::Evidence& evidence = *effect.mutable_evidence();
+  evidence.set_misfit_gain(gains_[e].gain);
+  evidence.set_misfit_gain_needed(gains_[e].needed);
+  evidence.set_held_out_misfit_without(misfit);
+  evidence.set_held_out_misfit(after_.misfit);
+  evidence.set_log_likelihood_gain(gain_nat);
+  add_parameters(e, *effect.mutable_parameters()->mutable_fields());
+  *effect.mutable_rmse_without_mm() = json_value(lesser.rmse_mm());
+  *effect.mutable_share_removed() =
+      json_value((misfit - after_.misfit) / std::max(before_.misfit - after_.misfit, 1e-9));
+  auto& facts = *effect.mutable_facts()->mutable_fields();
+  facts["misfit of training runs"] =
+      json_value(fmt::format("lowered by {:.0f}; significance bound {:.0f}", gains_[e].gain, gains_[e].needed));
+  facts["misfit on held-out runs"] =
+      json_value(fmt::format("{:.0f} without it, {:.0f} with it", misfit, after_.misfit));
+  facts["cells 10 s ahead"] =
+      json_value(fmt::format("{:.1f} mm without it, {:.1f} mm with it", lesser.rmse_mm(), after_.cells.rmse_mm()));
+  facts["likelihood of cells"] = json_value(fmt::format("{:+.0f} nat with it, for single-robot filters", gain_nat));
+  effect.set_in_words(is_wall ? words_of_wall(model_) : words_of(model_, e + 1));
+  say(fmt::format("{}: misfit {:.0f} without it, {:.0f} with it", name, misfit, after_.misfit));
+  return effect;
+}
+
+void FloorIdentification::add_ambiguities() {
+  const auto add = [&](const std::string& found, const char* instead, const std::string& experiment) {
+    identification::Ambiguous& ambiguous = *out().add_ambiguous();
+    ambiguous.set_found(found);
+    ambiguous.set_instead(instead);
+    ambiguous.set_experiment(experiment);
+  };
+  for (std::size_t t = 1; t < model_.terms.size(); ++t) {
+    if (!model_.terms[t].experiment.empty())
+      add(model_.terms[t].name, "see experiment", model_.terms[t].experiment);
+  }
+  if (model_.wall)
+    add(kWallEffect, "boundary messages that make robots turn away for longer in some places",
+        "let robots drive along the wall with the boundary messages switched off");
+}
+
+void FloorIdentification::judge() {
+  part_ = 0.85;
+  say("predictions");
+  before_ = judged(base_, 78, by_base_);
+  after_ = judged(model_, 79, by_model_);
+  for (const auto& [to, of] : {std::pair{out().mutable_before(), &before_}, {out().mutable_after(), &after_}}) {
+    *to = accuracy_of(of->cells);
+    to->set_misfit(of->misfit);
+  }
+  std::vector<identification::Effect> effects;
+  for (std::size_t e = 0; e < effects_of(model_); ++e) effects.push_back(judged_effect(e));
+  std::stable_sort(effects.begin(), effects.end(),
+                   [](const identification::Effect& a, const identification::Effect& b) {
+                     return a.share_removed().number_value() > b.share_removed().number_value();
+                   });
+  for (identification::Effect& effect : effects) *out().add_effects() = std::move(effect);
+  add_ambiguities();
+}
+
+void FloorIdentification::add_statistics() {
+  std::vector<double> sd(statistic_count());
+  for (std::size_t s = 0; s < sd.size(); ++s) sd[s] = std::sqrt(held_out_.tolerance()[s]);
+  for (const StatisticGroup& group : statistic_groups()) {
+    const bool root = group.name == "msd";
+    identification::FloorStatistic& statistic = *out().add_statistics();
+    statistic.set_name(group.name);
+    statistic.set_covariate(group.covariate);
+    assign(statistic.mutable_labels(), group.labels);
+    *statistic.mutable_measured() = numbers(held_out_.statistics().value, group, root);
+    *statistic.mutable_tolerance() = root ? json_null() : json_value(numbers(sd, group, false));
+    *statistic.mutable_before() = numbers(before_.statistics.value, group, root);
+    *statistic.mutable_after() = numbers(after_.statistics.value, group, root);
+    statistic.set_misfit_before(held_out_.misfit(before_.statistics, group));
+    statistic.set_misfit_after(held_out_.misfit(after_.statistics, group));
+  }
+}
+
+void FloorIdentification::compare_with_days() {
+  part_ = 0.95;
+  say("classifier");
+  add_statistics();
+  *out().mutable_classifier() = classify(alike_, unlike_, test_, held_out_, base_.settings(), model_.settings());
+  *found_.add_tables() = table_of_motion(held_out_, before_.statistics, after_.statistics);
+  add_words(found_);
+  add_plots(found_, held_out_, before_.statistics, after_.statistics);
+}
+
+/// The first four parameters of the base term belong to the drive, the others to the reception of cells.
+void FloorIdentification::add_base() {
+  identification::Base& base = *out().mutable_base();
+  base.set_straight_speed_mm_s(model_.values[0]);
+  base.set_turn_speed_mm_s(model_.values[1]);
+  base.set_bias_sd_mm_s(model_.values[2]);
+  base.set_factor_variance_s(model_.values[3]);
+  auto& floor = *out().mutable_floor()->mutable_fields();
+  const auto parameters = base_term().parameters;
+  for (std::size_t p = 4; p < parameters.size(); ++p) floor[parameters[p].name] = json_value(model_.values[p]);
+  floor["cell_later"] = json_value(json_list(model_.settings().radio.later));
+}
+
+Identified FloorIdentification::result() {
+  const FloorSettings settings = model_.settings();
+  out().set_noise_floor_mm(cell_noise_mm(floor_, settings.radio));
+  out().set_noise_floor_how(
+      "root mean square distance between robots and the centres of the cells that report them: the error of "
+      "exactly known positions");
+  out().set_horizon_s(options_.horizon_s);
+  add_base();
+  found_.mutable_set()->set_has_headings(false);
+  found_.mutable_set()->set_has_commands(false);
+  found_.mutable_set()->set_train(static_cast<std::uint32_t>(alike_.size() + unlike_.size()));
+  found_.mutable_set()->set_test(static_cast<std::uint32_t>(test_.size()));
+  Identified identified;
+  identified.model = settings.model;
+  for (std::size_t i = 0; i < std::min(by_base_.size(), by_model_.size()); ++i) {
+    const Predicted &b = by_base_[i], &a = by_model_[i];
+    identified.predictions.push_back({b.run, b.robot, b.at.time_s, b.at.x_mm, b.at.y_mm, a.at.x_mm, a.at.y_mm});
+  }
+  identified.found = std::move(found_);
+  part_ = 1;
+  say("done");
+  return identified;
+}
+
+/// Holds out every third run of the training set.
+void hold_out(std::vector<FloorRun>& train, std::vector<FloorRun>& test) {
+  std::vector<FloorRun> kept;
+  for (std::size_t r = 0; r < train.size(); ++r)
+    (train.size() > 1 && r % 3 == 1 ? test : kept).push_back(std::move(train[r]));
+  train = std::move(kept);
 }
 
 }  // namespace
 
 Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> test, const Options& options) {
-  const auto started = std::chrono::steady_clock::now();
-  if (test.empty()) {
-    std::vector<FloorRun> kept;
-    for (std::size_t r = 0; r < train.size(); ++r)
-      (train.size() > 1 && r % 3 == 1 ? test : kept).push_back(std::move(train[r]));
-    train = std::move(kept);
-  }
+  if (test.empty()) hold_out(train, test);
   if (train.empty() || test.empty() || train.front().tracks.empty())
     throw UserError("one run cannot be held out; give at least two runs, or --test DIR");
-  double part = 0;
-  const FloorProgress progress = [&](const std::string& what) {
-    if (options.progress) options.progress(part, what);
-  };
-  const Floor floor;
-  // An unlike day is reported and excluded from the fit: its conditions need not recur.
-  std::vector<FloorRun> alike, unlike;
-  json faults = faults_of(train, test);
-  const std::vector<UnlikeRun> unlikes = unlike_runs(train, floor);
-  for (std::size_t r = 0; r < train.size(); ++r) {
-    const auto is = std::find_if(unlikes.begin(), unlikes.end(), [&](const UnlikeRun& u) { return u.run == r; });
-    (is == unlikes.end() ? alike : unlike).push_back(train[r]);
-    if (is == unlikes.end()) continue;
-    faults.push_back(
-        {{"kind", "unlike"},
-         {"run", train[r].name},
-         {"in_words", fmt::format("{}: the robots behaved differently from those of the other runs ({}: {:.3g} "
-                                  "against {:.3g}); the run is excluded from the fit",
-                                  train[r].name, is->worst, is->value, is->others)}});
-    progress(fmt::format("{} is unlike the other runs", train[r].name));
-  }
-  const FloorTarget learned(alike, floor, options.threads), held_out(test, floor, options.threads);
-  json steps = json::array();
-  const auto note = [&](const std::string& added, const FloorModel& model) {
-    const double misfit = held_out.misfit(simulated_statistics(held_out, model.settings(), 4711));
-    steps.push_back({{"added", added}, {"held_out_misfit", misfit}});
-    progress(fmt::format("{}: misfit on held-out runs {:.0f}, {} statistics", added, misfit, held_out.size()));
-  };
-
-  FloorModel model;
-  model.add(base_term());
-  part = 0.02;
-  fit_from_far_start(model, learned, 1, progress);
-  fit(model, learned, 2, 1, 1, progress);
-  const FloorModel base = model;
-  note("base", model);
-
-  json effects = json::array(), rejected = json::array(), ambiguous = json::array();
-  std::vector<EffectGain> gains;
-  if (options.find_effects) {
-    const double from = 0.15, to = 0.85;
-    FloorFound found = search_effects(
-        base, learned, candidate_terms(floor),
-        [&](double done, const std::string& what) {
-          part = from + (to - from) * done;
-          progress(what);
-        },
-        note);
-    model = std::move(found.model);
-    gains = std::move(found.gains);
-    for (const RejectedEffect& effect : found.rejected)
-      rejected.push_back({{"name", effect.gain.name},
-                          {"covariates", effect.covariates},
-                          {"acts_on", effect.acts_on},
-                          {"misfit_gain", effect.gain.gain},
-                          {"misfit_gain_needed", effect.gain.needed},
-                          {"why", effect.why}});
-  }
-
-  part = 0.85;
-  progress("predictions");
-  std::vector<Predicted> by_base, by_model;
-  const Validation before = validate(test, floor, base.settings(), options.horizon_s, &by_base),
-                   after = validate(test, floor, model.settings(), options.horizon_s, &by_model);
-  const FloorStatistics out_before = simulated_statistics(held_out, base.settings(), 78, 2),
-                        out_after = simulated_statistics(held_out, model.settings(), 79, 2);
-  const double misfit_before = held_out.misfit(out_before), misfit_after = held_out.misfit(out_after);
-  for (std::size_t e = 0; e < effects_of(model); ++e) {
-    const FloorModel less = without(model, e);
-    const bool is_wall = name_of(model, e) == kWallEffect;
-    const double misfit = held_out.misfit(simulated_statistics(held_out, less.settings(), 79));
-    const Validation lesser = validate(test, floor, less.settings(), options.horizon_s, nullptr);
-    json parameters;
-    if (is_wall) {
-      parameters = {{"form", "steps"}, {"beside_mm", FloorModel::kBeside_mm}, {"part_of_speed", *model.wall}};
-    } else {
-      parameters["form"] = "record of the model";
-      for (std::size_t p = 0; p < model.terms[e + 1].parameters.size(); ++p)
-        parameters[model.terms[e + 1].parameters[p].name] = model.values[model.first_of(e + 1) + p];
-      if (!model.terms[e + 1].experiment.empty())
-        ambiguous.push_back({{"found", name_of(model, e)},
-                             {"instead", "see experiment"},
-                             {"experiment", model.terms[e + 1].experiment}});
-    }
-    effects.push_back(
-        {{"name", name_of(model, e)},
-         {"covariates", covariates_of(model, e)},
-         {"acts_on", is_wall ? "WHEEL_GAIN" : model.terms[e + 1].acts_on},
-         {"evidence",
-          {{"misfit_gain", gains[e].gain},
-           {"misfit_gain_needed", gains[e].needed},
-           {"held_out_misfit_without", misfit},
-           {"held_out_misfit", misfit_after},
-           {"log_likelihood_gain", after.log_likelihood - lesser.log_likelihood}}},
-         {"parameters", parameters},
-         {"rmse_without_mm", lesser.rmse_mm()},
-         {"share_removed", (misfit - misfit_after) / std::max(misfit_before - misfit_after, 1e-9)},
-         {"facts",
-          {{"misfit of training runs",
-            fmt::format("lowered by {:.0f}; significance bound {:.0f}", gains[e].gain, gains[e].needed)},
-           {"misfit on held-out runs", fmt::format("{:.0f} without it, {:.0f} with it", misfit, misfit_after)},
-           {"cells 10 s ahead",
-            fmt::format("{:.1f} mm without it, {:.1f} mm with it", lesser.rmse_mm(), after.rmse_mm())},
-           {"likelihood of cells", fmt::format("{:+.0f} nat with it, for single-robot filters",
-                                               after.log_likelihood - lesser.log_likelihood)}}},
-         {"in_words", is_wall ? words_of_wall(model) : words_of(model, e + 1)}});
-    progress(fmt::format("{}: misfit {:.0f} without it, {:.0f} with it", name_of(model, e), misfit, misfit_after));
-  }
-  if (model.wall)
-    ambiguous.push_back(
-        {{"found", kWallEffect},
-         {"instead", "boundary messages that make robots turn away for longer in some places"},
-         {"experiment", "let robots drive along the wall with the boundary messages switched off"}});
-  std::stable_sort(effects.begin(), effects.end(),
-                   [](const json& a, const json& b) { return a["share_removed"] > b["share_removed"]; });
-
-  part = 0.95;
-  progress("classifier");
-  json statistics = json::array();
-  for (const StatisticGroup& group : statistic_groups()) {
-    const bool root = group.name == "msd";
-    std::vector<double> sd(statistic_count());
-    for (std::size_t s = 0; s < sd.size(); ++s) sd[s] = std::sqrt(held_out.tolerance()[s]);
-    statistics.push_back({{"name", group.name},
-                          {"covariate", group.covariate},
-                          {"labels", group.labels},
-                          {"measured", numbers(held_out.statistics().value, group, root)},
-                          {"tolerance", root ? json() : numbers(sd, group, false)},
-                          {"before", numbers(out_before.value, group, root)},
-                          {"after", numbers(out_after.value, group, root)},
-                          {"misfit_before", held_out.misfit(out_before, group)},
-                          {"misfit_after", held_out.misfit(out_after, group)}});
-  }
-  Identified result;
-  const FloorSettings settings = model.settings();
-  result.model = settings.model;
-  for (std::size_t i = 0; i < std::min(by_base.size(), by_model.size()); ++i) {
-    const Predicted &b = by_base[i], &a = by_model[i];
-    result.predictions.push_back({b.run, b.robot, b.at.time_s, b.at.x_mm, b.at.y_mm, a.at.x_mm, a.at.y_mm});
-  }
-  json summary_before = summary_of(before), summary_after = summary_of(after);
-  summary_before["misfit"] = misfit_before;
-  summary_after["misfit"] = misfit_after;
-  json& contract = result.document["contract"];
-  contract = {
-      {"before", summary_before},
-      {"after", summary_after},
-      {"noise_floor_mm", cell_noise_mm(floor, settings.radio)},
-      {"noise_floor_how",
-       "root mean square distance between robots and the centres of the cells that report them: the error of "
-       "exactly known positions"},
-      {"horizon_s", options.horizon_s},
-      {"effects", effects},
-      {"rejected", rejected},
-      {"ambiguous", ambiguous},
-      {"faults", faults},
-      {"statistics", statistics},
-      {"classifier", classify(alike, unlike, test, held_out, base.settings(), settings)}};
-  result.document["tables"] = {table_of_motion(held_out, out_before, out_after)};
-  add_words(result.document, contract.at("classifier"));
-  const auto parameters = base_term().parameters;
-  for (std::size_t p = 0; p < parameters.size(); ++p)
-    contract[p < 4 ? "base" : "floor"][parameters[p].name] = model.values[p];
-  contract["floor"]["cell_later"] = settings.radio.later;
-  result.document["set"] = {
-      {"train", train.size()}, {"test", test.size()}, {"has_headings", false}, {"has_commands", false}};
-  result.document["steps"] = steps;
-  add_plots(result.document, held_out, out_before, out_after);
-  result.document["robots"] = json::array();
-  result.document["seconds"]["all"] =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
-  part = 1;
-  progress("done");
-  return result;
+  FloorIdentification identification(train, test, options);
+  identification.fit_base();
+  if (options.find_effects) identification.search();
+  identification.judge();
+  identification.compare_with_days();
+  return identification.result();
 }
 
 }  // namespace kilotwin::kilogrid

@@ -10,11 +10,7 @@
 
 namespace kilotwin::kilogrid {
 
-/// `test` empty: holds out every third run of `train`. Returns the document of clients/identify/identify.hpp with
-/// further keys:
-///   contract.statistics  [{name, covariate, labels, measured, tolerance, before, after}] of held-out runs
-///   contract.classifier  {measured, before, after, runs [..]}: areas under the ROC curve, 0.5 is chance level
-///   contract.floor       nuisance parameters: reception of cells, robots at the boundary
+/// `test` empty: holds out every third run of `train`.
 [[nodiscard]] identify::Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> test,
                                                   const identify::Options&);
 

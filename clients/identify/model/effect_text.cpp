@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "clients/identify/model/effect_records.hpp"
+#include "clients/identify/result/values.hpp"
 #include "core/effects/function.hpp"
 #include "core/plan/from_manifest.hpp"
 
@@ -377,8 +378,8 @@ std::string size_in_words(const std::vector<Effect>& effects) {
   return fmt::format("{}", fmt::join(parts, "; "));
 }
 
-nlohmann::json curves_of(const std::string& name, const std::vector<Effect>& effects) {
-  nlohmann::json all = nlohmann::json::array();
+std::vector<identification::EffectCurve> curves_of(const std::string& name, const std::vector<Effect>& effects) {
+  std::vector<identification::EffectCurve> all;
   const Amplitudes shown = without_amplitudes(effects);
   for (const Effect* one : sorted(shown.curves).others) {
     const Effect& effect = *one;
@@ -386,61 +387,54 @@ nlohmann::json curves_of(const std::string& name, const std::vector<Effect>& eff
       continue;
     const Function& f = effect.function(0);
     const Unit unit = unit_of(f), acting = unit_of(effect.acts_on());
-    nlohmann::json curve = {{"name", name},
-                            {"which", which_of(effect)},
-                            {"covariate", name_of(f)},
-                            {"unit", unit.name},
-                            {"acts_on", Effect::Target_Name(effect.acts_on())},
-                            {"acts_on_unit", acting.name},
-                            {"at", nlohmann::json::array()},
-                            {"value", nlohmann::json::array()}};
-    for (int i = 0; i < f.spline().knot_size(); ++i) {
-      curve["at"].push_back(f.spline().knot(i) * unit.factor);
-      curve["value"].push_back(f.spline().value(i) * acting.factor);
-    }
+    identification::EffectCurve& curve = all.emplace_back();
+    curve.set_name(name);
+    curve.set_which(which_of(effect));
+    curve.set_covariate(name_of(f));
+    curve.set_unit(unit.name);
+    curve.set_acts_on(Effect::Target_Name(effect.acts_on()));
+    curve.set_acts_on_unit(acting.name);
+    const auto add = [&](double at, double value) {
+      curve.add_at(at * unit.factor);
+      curve.add_value(value * acting.factor);
+    };
+    for (int i = 0; i < f.spline().knot_size(); ++i) add(f.spline().knot(i), f.spline().value(i));
     if (f.has_steps() && f.steps().at_size() > 0) {
       // Steps: a tenth of their range beyond both ends.
       const proto::Steps& steps = f.steps();
       const double first = steps.at(0), last = steps.at(steps.at_size() - 1);
       const double beyond = std::max(0.1 * (last - first), 1.0);
-      const auto add = [&](double at, int value) {
-        curve["at"].push_back(at * unit.factor);
-        curve["value"].push_back(steps.value(value) * acting.factor);
-      };
-      add(first - beyond, 0);
+      add(first - beyond, steps.value(0));
       for (int i = 0; i < steps.at_size(); ++i) {
-        add(steps.at(i), i);
-        add(steps.at(i), i + 1);
+        add(steps.at(i), steps.value(i));
+        add(steps.at(i), steps.value(i + 1));
       }
-      add(last + beyond, steps.at_size());
+      add(last + beyond, steps.value(steps.at_size()));
     }
-    all.push_back(std::move(curve));
   }
   return all;
 }
 
-nlohmann::json maps_of(const std::string& name, const std::vector<Effect>& effects) {
-  nlohmann::json all = nlohmann::json::array();
+std::vector<identification::EffectMap> maps_of(const std::string& name, const std::vector<Effect>& effects) {
+  std::vector<identification::EffectMap> all;
   const Amplitudes shown = without_amplitudes(effects);
   for (const std::vector<const Effect*>& map : sorted(shown.curves).maps) {
     const MapSum sum = sum_of(map);
     if (sum.value.empty()) continue;
     const Effect::Target target = map.front()->acts_on();
     const Unit acting = unit_of(target);
-    nlohmann::json rows = nlohmann::json::array();
+    identification::EffectMap& out = all.emplace_back();
+    out.set_name(name);
+    out.set_which(which_of(*map.front()));
+    out.set_acts_on(Effect::Target_Name(target));
+    out.set_unit(acting.name);
+    assign(out.mutable_x_mm(), sum.x_mm);
+    assign(out.mutable_y_mm(), sum.y_mm);
     for (std::size_t j = 0; j < sum.y_mm.size(); ++j) {
-      nlohmann::json row = nlohmann::json::array();
+      JsonList& row = *out.add_effect();
       for (std::size_t i = 0; i < sum.x_mm.size(); ++i)
-        row.push_back(sum.value[j * sum.x_mm.size() + i] * acting.factor);
-      rows.push_back(std::move(row));
+        *row.add_values() = json_value(sum.value[j * sum.x_mm.size() + i] * acting.factor);
     }
-    all.push_back({{"name", name},
-                   {"which", which_of(*map.front())},
-                   {"acts_on", Effect::Target_Name(target)},
-                   {"unit", acting.name},
-                   {"x_mm", sum.x_mm},
-                   {"y_mm", sum.y_mm},
-                   {"effect", std::move(rows)}});
   }
   return all;
 }

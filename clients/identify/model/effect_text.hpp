@@ -1,11 +1,11 @@
 /// Effect records in words and as plot data.
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "idl/effects.pb.h"
+#include "idl/identification.pb.h"
 
 namespace kilotwin::identify {
 
@@ -14,12 +14,12 @@ namespace kilotwin::identify {
 /// The curve is then given at amplitude 1.
 [[nodiscard]] std::string size_in_words(const std::vector<proto::Effect>&);
 
-/// Records that are curves over one covariate: [{name, covariate, unit, acts_on, acts_on_unit, at [..], value
-/// [..]}].
-[[nodiscard]] nlohmann::json curves_of(const std::string& name, const std::vector<proto::Effect>&);
+/// Records that are curves over one covariate.
+[[nodiscard]] std::vector<identification::EffectCurve> curves_of(const std::string& name,
+                                                                 const std::vector<proto::Effect>&);
 
-/// Records that are maps over the arena, summed per target: [{name, which, acts_on, unit, x_mm [..], y_mm [..],
-/// effect [y][x]}].
-[[nodiscard]] nlohmann::json maps_of(const std::string& name, const std::vector<proto::Effect>&);
+/// Records that are maps over the arena, summed per target.
+[[nodiscard]] std::vector<identification::EffectMap> maps_of(const std::string& name,
+                                                             const std::vector<proto::Effect>&);
 
 }  // namespace kilotwin::identify

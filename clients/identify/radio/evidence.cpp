@@ -7,6 +7,8 @@
 #include <numbers>
 #include <random>
 
+#include "core/stats/distributions.hpp"
+
 namespace kilotwin::radio_fit {
 namespace {
 
@@ -35,7 +37,7 @@ Residuals residuals(const std::vector<GridSet>& sets, const LinkModel& model) {
     for (int j = 0; j < sets[q].robots(); ++j) {
       for (int i = 0; i < sets[q].robots(); ++i) {
         if (i == j || on(i, j) < 0 || std::isnan(swarm.margin_db(i, j))) continue;
-        const double expected = 0.5 * std::erfc(-swarm.margin_db(i, j) / swarm.run_sd_db / std::numbers::sqrt2);
+        const double expected = stats::normal_cdf(swarm.margin_db(i, j) / swarm.run_sd_db);
         value.push_back(on(i, j) - expected);
         set_of.push_back(q);
         result.of.push_back({first + j, first + i});

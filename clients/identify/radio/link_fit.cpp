@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/base/pose.hpp"
+#include "core/stats/distributions.hpp"
 
 namespace kilotwin::radio_fit {
 namespace {
@@ -33,9 +34,6 @@ struct Row {
   double bodies, on, runs;
 };
 
-double normal_cdf(double x) { return 0.5 * std::erfc(-x * std::numbers::sqrt2 / 2); }
-double normal_pdf(double x) { return std::exp(-x * x / 2) / std::sqrt(2 * std::numbers::pi); }
-
 /// A random effect of the margins: independent coefficients with one variance. One column of `design` per
 /// coefficient.
 struct Group {
@@ -60,6 +58,10 @@ class Fit {
     groups_.push_back({std::move(design), std::move(covariance), sd_db, fixed});
   }
   double find_mode(bool spreads);
+  void fit_spreads();
+  [[nodiscard]] LinkModel::Swarm swarm_of(std::size_t set, const std::vector<VectorXd>& effects,
+                                          std::size_t first) const;
+  void add_links(LinkModel&, std::size_t first) const;
   [[nodiscard]] VectorXd variances() const;
   [[nodiscard]] VectorXd offsets() const;
 
@@ -175,7 +177,7 @@ double Fit::find_mode(bool spreads) {
     for (Eigen::Index r = 0; r < count; ++r) {
       const Row& row = rows_[static_cast<std::size_t>(r)];
       const double sd = run_sd_[row.set], z = std::clamp(margin(r) / sd, -6.0, 6.0);
-      const double p = normal_cdf(z), density = normal_pdf(z);
+      const double p = stats::normal_cdf(z), density = stats::normal_pdf(z);
       likelihood += row.runs * (row.on * std::log(p) + (1 - row.on) * std::log(1 - p));
       slope(r) = row.runs * density * (row.on - p) / (p * (1 - p)) / sd;
       weight(r) = std::max(row.runs * density * density / (p * (1 - p)) / (sd * sd), 1e-9);
@@ -231,7 +233,7 @@ VectorXd Fit::variances() const {
   return covariance.diagonal() - known.colwise().squaredNorm().transpose();
 }
 
-LinkModel Fit::run() {
+void Fit::fit_spreads() {
   // Without random effects only the noise of runs needs iterations.
   const int rounds = terms_ >= Terms::kRobots ? kRounds : 3;
   double factor = 1.6;
@@ -254,7 +256,53 @@ LinkModel Fit::run() {
     factor = std::sqrt(factor);
   }
   find_mode(false);
+}
 
+/// The robots of a set, from the effects of their groups; `first`: the group of their power.
+LinkModel::Swarm Fit::swarm_of(std::size_t set, const std::vector<VectorXd>& effects, std::size_t first) const {
+  const Eigen::Index robots = sets_.front().robots(), begin = static_cast<Eigen::Index>(set) * robots;
+  LinkModel::Swarm swarm;
+  swarm.set = sets_[set].name;
+  swarm.run_sd_db = run_sd_[set];
+  swarm.power_db = swarm.sensitivity_db = VectorXd::Zero(robots);
+  swarm.power_bearing_db = swarm.sensitivity_bearing_db = MatrixXd::Zero(robots, 2);
+  swarm.link_db = MatrixXd::Zero(robots, robots);
+  swarm.margin_db = MatrixXd::Constant(robots, robots, NAN);
+  if (terms_ >= Terms::kRobots) {
+    swarm.power_db = effects[first].segment(begin, robots);
+    swarm.sensitivity_db = effects[first + 1].segment(begin, robots);
+  }
+  if (terms_ >= Terms::kBearings) {
+    for (Eigen::Index i = 0; i < robots; ++i) {
+      swarm.power_bearing_db.row(i) = effects[first + 2].segment(2 * (begin + i), 2).transpose();
+      swarm.sensitivity_bearing_db.row(i) = effects[first + 3].segment(2 * (begin + i), 2).transpose();
+    }
+  }
+  return swarm;
+}
+
+/// Margins of all links, and the links' own offsets; `first`: the group of pairs.
+void Fit::add_links(LinkModel& model, std::size_t first) const {
+  const VectorXd variance = variances();
+  for (std::size_t r = 0; r < rows_.size(); ++r) {
+    const Row& row = rows_[r];
+    LinkModel::Swarm& swarm = model.swarms[row.set];
+    const auto at = static_cast<Eigen::Index>(r);
+    swarm.margin_db(row.receiver, row.sender) = margin_(at);
+    // Uncertainty of a margin moves its probability towards one half: the equivalent margin with the noise of runs
+    // only. Between close robots the model's mean is used.
+    const double wider = std::sqrt(1 + variance(at) / (swarm.run_sd_db * swarm.run_sd_db));
+    const double even = row.distance_mm > kSurelyHeard_mm ? margin_(at) * (1 / wider - 1) : 0;
+    if (terms_ >= Terms::kPairs) {
+      const Group &pair = groups_[first], &link = groups_[first + 1];
+      swarm.link_db(row.receiver, row.sender) = (pair.sd_db * pair.sd_db * pair.covariance.row(at).dot(dual_)) +
+                                                link.sd_db * link.sd_db * dual_(at) + even;
+    }
+  }
+}
+
+LinkModel Fit::run() {
+  fit_spreads();
   LinkModel model;
   model.terms = terms_;
   std::vector<VectorXd> effects;
@@ -270,47 +318,14 @@ LinkModel Fit::run() {
   const std::size_t placement = next;
   if (terms_ >= Terms::kPlacement) model.laying_sd_db = groups_[next++].sd_db;
   if (terms_ >= Terms::kBodies) model.body_loss_db = effects[next++](0);
-  const Eigen::Index robots = sets_.front().robots();
   for (std::size_t q = 0; q < sets_.size(); ++q) {
-    LinkModel::Swarm& swarm = model.swarms.emplace_back();
-    swarm.set = sets_[q].name;
-    swarm.run_sd_db = run_sd_[q];
+    LinkModel::Swarm& swarm = model.swarms.emplace_back(swarm_of(q, effects, next));
     swarm.pattern_db = model.pattern_db;
     for (std::size_t n = 0; n < swarm.pattern_db.size() && terms_ >= Terms::kPlacement; ++n)
       swarm.pattern_db[n] += effects[placement](static_cast<Eigen::Index>(q * swarm.pattern_db.size() + n)) /
                              static_cast<double>(n / 2 + 1);
-    const Eigen::Index first = static_cast<Eigen::Index>(q) * robots;
-    swarm.power_db = swarm.sensitivity_db = VectorXd::Zero(robots);
-    swarm.power_bearing_db = swarm.sensitivity_bearing_db = MatrixXd::Zero(robots, 2);
-    swarm.link_db = MatrixXd::Zero(robots, robots);
-    swarm.margin_db = MatrixXd::Constant(robots, robots, NAN);
-    if (terms_ >= Terms::kRobots) {
-      swarm.power_db = effects[next].segment(first, robots);
-      swarm.sensitivity_db = effects[next + 1].segment(first, robots);
-    }
-    if (terms_ >= Terms::kBearings) {
-      for (Eigen::Index i = 0; i < robots; ++i) {
-        swarm.power_bearing_db.row(i) = effects[next + 2].segment(2 * (first + i), 2).transpose();
-        swarm.sensitivity_bearing_db.row(i) = effects[next + 3].segment(2 * (first + i), 2).transpose();
-      }
-    }
   }
-  const VectorXd variance = variances();
-  for (std::size_t r = 0; r < rows_.size(); ++r) {
-    const Row& row = rows_[r];
-    LinkModel::Swarm& swarm = model.swarms[row.set];
-    const auto at = static_cast<Eigen::Index>(r);
-    swarm.margin_db(row.receiver, row.sender) = margin_(at);
-    // Uncertainty of a margin moves its probability towards one half: the equivalent margin with the noise of runs
-    // only. Between close robots the model's mean is used.
-    const double wider = std::sqrt(1 + variance(at) / (swarm.run_sd_db * swarm.run_sd_db));
-    const double even = row.distance_mm > kSurelyHeard_mm ? margin_(at) * (1 / wider - 1) : 0;
-    if (terms_ >= Terms::kPairs) {
-      const Group &pair = groups_[next + 4], &link = groups_[next + 5];
-      swarm.link_db(row.receiver, row.sender) = (pair.sd_db * pair.sd_db * pair.covariance.row(at).dot(dual_)) +
-                                                link.sd_db * link.sd_db * dual_(at) + even;
-    }
-  }
+  add_links(model, next + 4);
   if (terms_ >= Terms::kRobots) {
     model.power_sd_db = groups_[next].sd_db;
     model.sensitivity_sd_db = groups_[next + 1].sd_db;

@@ -7,12 +7,13 @@
 #include <cmath>
 #include <fstream>
 #include <functional>
-#include <nlohmann/json.hpp>
 
 #include "clients/identify/radio/evidence.hpp"
 #include "clients/identify/radio/grid_run.hpp"
 #include "clients/identify/radio/link_fit.hpp"
 #include "clients/identify/radio/scores.hpp"
+#include "clients/identify/result/result_json.hpp"
+#include "clients/identify/result/values.hpp"
 #include "clients/report/plot.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
@@ -21,7 +22,6 @@
 namespace kilotwin::radio_fit {
 namespace {
 
-using Json = nlohmann::ordered_json;
 using Radios = std::vector<proto::Radio>;  ///< one per set
 
 /// 16 kilo_ticks of the nominal clock.
@@ -34,7 +34,7 @@ struct Step {
   std::string name, added;
   std::vector<std::string> covariates;
   std::string evidence;
-  Json figures;
+  identification::Evidence figures;
   std::vector<Errors> errors;  ///< per set
 };
 
@@ -57,7 +57,7 @@ class Loop {
       }
     }
   }
-  void go();
+  [[nodiscard]] RadioFound go();
 
  private:
   void add(Step step, const Radios& radios);
@@ -70,8 +70,10 @@ class Loop {
   void fit_wander();
   [[nodiscard]] LinkModel::Timing drawn() const;
   void draw_population();
-  void write_models() const;
-  void write_result() const;
+  /// Returns the model of the population.
+  [[nodiscard]] proto::Model write_models() const;
+  [[nodiscard]] identification::RadioFit result() const;
+  void write_tables(const identification::RadioFit&) const;
   void write_figures() const;
   [[nodiscard]] Radios alike(const proto::Radio& radio) const { return Radios(train_.size(), radio); }
   [[nodiscard]] Radios fitted(const LinkModel& model) const;
@@ -81,7 +83,7 @@ class Loop {
   std::vector<Step> steps_;
   LinkModel model_;
   LinkModel::Timing timing_;
-  Json population_ = Json::array();
+  std::vector<identification::PopulationClass> population_;
 };
 
 std::string text_of(const Evidence& e) {
@@ -89,8 +91,13 @@ std::string text_of(const Evidence& e) {
                      e.by_chance_sd);
 }
 
-Json json_of(const Evidence& e) {
-  return {{"what", e.what}, {"value", e.explained}, {"by_chance", e.by_chance}, {"by_chance_sd", e.by_chance_sd}};
+identification::Evidence entry_of(const Evidence& e) {
+  identification::Evidence out;
+  out.set_what(e.what);
+  out.set_value(e.explained);
+  out.set_by_chance(e.by_chance);
+  out.set_by_chance_sd(e.by_chance_sd);
+  return out;
 }
 
 void Loop::add(Step step, const Radios& radios) {
@@ -146,18 +153,20 @@ void Loop::add_simple() {
                    distance.range_mm, radio.simple().contention()),
        {},
        "-",
-       Json::object(),
+       {},
        {}},
       alike(radio));
   double sent = 0;
   for (const GridSet& set : train_) sent += statistics(set).sent / static_cast<double>(train_.size());
   radio.mutable_simple()->set_interval_s(kSixteenTicks_s);
   tune();
+  identification::Evidence clock;
+  clock.set_kilo_ticks_per_message(4800 / sent);
   add({"clock per robot",
        fmt::format("a message every 16 kilo_ticks (contention {:.2f})", radio.simple().contention()),
        {"time"},
        fmt::format("robots send {:.1f} in 4800 of their kilo_ticks, at most 301: one in {:.2f}", sent, 4800 / sent),
-       Json{{"kilo_ticks_per_message", 4800 / sent}},
+       clock,
        {}},
       alike(radio));
   proto::Radio disc;
@@ -168,7 +177,7 @@ void Loop::add_simple() {
        "packets of 4.371 ms, carrier sense from the start pulse, collisions where two overlap; nothing is tuned",
        {"neighbours"},
        text_of(hidden),
-       json_of(hidden),
+       entry_of(hidden),
        {}},
       alike(disc));
 }
@@ -190,12 +199,14 @@ void Loop::add_links() {
     return partly / far;
   };
   model_ = fit_links(train_, Terms::kDistance);
+  identification::Evidence heard;
+  heard.set_heard_in_some_run(heard_in_some_run());
   add({"signal strength",
        fmt::format("0.139 dB/mm, heard up to {:.1f} mm, and noise from run to run", model_.range_mm),
        {"neighbours"},
        fmt::format("no distance divides the links: of those at 125..200 mm {:.0f} % are heard in some run",
-                   100 * heard_in_some_run()),
-       Json{{"heard_in_some_run", heard_in_some_run()}},
+                   100 * heard.heard_in_some_run()),
+       heard,
        {}},
       fitted(model_));
 
@@ -204,7 +215,7 @@ void Loop::add_links() {
                         std::vector<std::string> covariates) {
     const Evidence evidence = evidence_of(train_, model_);
     model_ = fit_links(train_, terms);
-    add({name, words(), std::move(covariates), text_of(evidence), json_of(evidence), {}}, fitted(model_));
+    add({name, words(), std::move(covariates), text_of(evidence), entry_of(evidence), {}}, fitted(model_));
   };
   step("bearing", bearing_evidence, Terms::kPattern,
        [&] { return std::string("common transmit pattern over the bearing, 8 harmonics"); }, {"heading"});
@@ -253,13 +264,16 @@ void Loop::add_packets() {
     chosen = sd_db;
   }
   timing_.packet_sd_db = chosen;
+  identification::Evidence partly;
+  partly.set_measured(measured);
+  partly.set_before(before);
   add({"packet noise",
        fmt::format("noise from packet to packet, sd {:.2f} dB", chosen),
        {"time"},
        fmt::format("of (link, run) of 125..200 mm {:.3f} are heard in part; simulated with 0.15 dB {:.3f}, with "
                    "this {:.3f}",
                    measured, before, partial(chosen)),
-       Json{{"measured", measured}, {"before", before}},
+       partly,
        {}},
       fitted(model_));
 }
@@ -316,7 +330,7 @@ void Loop::add_oscillators() {
                    100 * timing_.oscillator_sd),
        {"robot", "time"},
        text_of(own),
-       json_of(own),
+       entry_of(own),
        {}},
       fitted(model_));
 }
@@ -344,7 +358,7 @@ void Loop::add_carrier_sense() {
        fmt::format("carrier sense detects signals down to {:.2f} dB below the reception level", chosen),
        {"neighbours"},
        text_of(notice),
-       json_of(notice),
+       entry_of(notice),
        {}},
       fitted(model_));
 }
@@ -376,15 +390,16 @@ void Loop::draw_population() {
         return drawn[c][static_cast<std::size_t>(share * static_cast<double>(drawn[c].size() - 1) + 0.5)];
       };
       const DisplacementClass& is = real.classes[c];
-      population_.push_back(Json{{"set", train_[q].name},
-                                 {"rows", is.rows},
-                                 {"columns", is.columns},
-                                 {"distance_mm", is.distance_mm},
-                                 {"measured", is.reception},
-                                 {"low", at(0.025)},
-                                 {"median", at(0.5)},
-                                 {"high", at(0.975)},
-                                 {"inside", is.reception >= at(0.025) - 1e-9 && is.reception <= at(0.975) + 1e-9}});
+      identification::PopulationClass& row = population_.emplace_back();
+      row.set_set(train_[q].name);
+      row.set_rows(is.rows);
+      row.set_columns(is.columns);
+      row.set_distance_mm(is.distance_mm);
+      row.set_measured(is.reception);
+      row.set_low(at(0.025));
+      row.set_median(at(0.5));
+      row.set_high(at(0.975));
+      row.set_inside(is.reception >= row.low() - 1e-9 && is.reception <= row.high() + 1e-9);
     }
   }
 }
@@ -395,7 +410,7 @@ void write_text(const std::filesystem::path& file, const std::string& text) {
   if (!out.flush()) throw RunError(file.string() + ": cannot be written");
 }
 
-void Loop::write_models() const {
+proto::Model Loop::write_models() const {
   const auto write = [&](const proto::Radio& radio, const std::string& name, const std::string& about) {
     proto::Model model;
     proto::Propagation& propagation = *model.mutable_propagation() = radio.propagation();
@@ -404,107 +419,113 @@ void Loop::write_models() const {
     std::string text;
     google::protobuf::TextFormat::PrintToString(model, &text);
     write_text(options_.out / name, "# " + about + "\n" + text);
+    return model;
   };
-  // Undisturbed placements vary least between runs: uses the smallest noise of the sets.
-  const auto steadiest = std::min_element(model_.swarms.begin(), model_.swarms.end(),
-                                          [](const auto& a, const auto& b) { return a.run_sd_db < b.run_sd_db; });
-  write(model_.population(*steadiest, drawn()), "model.txtpb",
-        "Range, pattern and variances, fitted to all sets; robots and pairs are random.");
   for (std::size_t q = 0; q < train_.size(); ++q) {
     write(model_.radio(model_.swarms[q], timing_), "model-" + train_[q].name + ".txtpb",
           "The same with the robots and pairs of " + train_[q].name + ".");
   }
+  // Undisturbed placements vary least between runs: uses the smallest noise of the sets.
+  const auto steadiest = std::min_element(model_.swarms.begin(), model_.swarms.end(),
+                                          [](const auto& a, const auto& b) { return a.run_sd_db < b.run_sd_db; });
+  return write(model_.population(*steadiest, drawn()), "model.txtpb",
+               "Range, pattern and variances, fitted to all sets; robots and pairs are random.");
 }
 
-Json json_of(const Errors& e) {
-  return {{"sent", e.simulated.sent},
-          {"sent_error", e.sent},
-          {"near_worst", e.near_worst},
-          {"far_worst", e.far_worst},
-          {"silent_error", e.silent},
-          {"sender_spread_error", e.sender_spread},
-          {"run_spread_error", e.run_spread},
-          {"log_likelihood", e.log_likelihood},
-          {"deficit", e.deficit}};
+identification::RadioErrors entry_of(const Errors& e) {
+  identification::RadioErrors out;
+  out.set_sent(e.simulated.sent);
+  out.set_sent_error(e.sent);
+  out.set_near_worst(e.near_worst);
+  out.set_far_worst(e.far_worst);
+  out.set_silent_error(e.silent);
+  out.set_sender_spread_error(e.sender_spread);
+  out.set_run_spread_error(e.run_spread);
+  out.set_log_likelihood(e.log_likelihood);
+  out.set_deficit(e.deficit);
+  return out;
 }
 
-void Loop::write_result() const {
-  Json result;
-  result["effects"] = Json::array();
+identification::RadioModel entry_of(const LinkModel& model, const LinkModel::Timing& timing) {
+  identification::RadioModel out;
+  out.set_range_mm(model.range_mm);
+  identify::assign(out.mutable_pattern_db(), model.pattern_db);
+  out.set_body_loss_db(model.body_loss_db);
+  out.set_power_sd_db(model.power_sd_db);
+  out.set_sensitivity_sd_db(model.sensitivity_sd_db);
+  out.set_power_bearing_sd_db(model.power_bearing_sd_db);
+  out.set_sensitivity_bearing_sd_db(model.sensitivity_bearing_sd_db);
+  out.set_pair_sd_db(model.pair_sd_db);
+  out.set_link_sd_db(model.link_sd_db);
+  out.set_laying_sd_db(model.laying_sd_db);
+  out.set_packet_sd_db(timing.packet_sd_db);
+  out.set_notice_db(timing.notice_db);
+  out.set_oscillator_sd(timing.oscillator_sd);
+  for (const double rate : timing.oscillator) out.add_oscillator(rate);
+  return out;
+}
+
+identification::RadioFit Loop::result() const {
+  identification::RadioFit out;
+  for (const Step& step : steps_) {
+    identification::RadioStep& effect = *out.add_effects();
+    effect.set_name(step.name);
+    identify::assign(effect.mutable_covariates(), step.covariates);
+    effect.set_acts_on("radio");
+    *effect.mutable_evidence() = step.figures;
+    effect.mutable_parameters()->set_added(step.added);
+    for (std::size_t q = 0; q < step.errors.size(); ++q)
+      (*effect.mutable_errors())[train_[q].name] = entry_of(step.errors[q]);
+  }
+  for (std::size_t q = 0; q < train_.size(); ++q) {
+    (*out.mutable_fitted_runs_themselves())[train_[q].name] = entry_of(compare(test_[q], train_[q], train_[q]));
+    (*out.mutable_measured_sent())[test_[q].name] = statistics(test_[q]).sent;
+  }
+  *out.mutable_shared() = entry_of(model_, timing_);
+  identification::RadioSets& sets = *out.mutable_of_each_set();
+  sets.set_correlation_of_power(same_robots(model_, true));
+  sets.set_correlation_of_sensitivity(same_robots(model_, false));
+  for (const LinkModel::Swarm& swarm : model_.swarms) (*sets.mutable_run_sd_db())[swarm.set] = swarm.run_sd_db;
+  for (const identification::PopulationClass& row : population_) *out.add_population() = row;
+  return out;
+}
+
+std::string cells_of(const identification::RadioErrors& e) {
+  return fmt::format("{:+.1f} | {:.3f} | {:.3f} | {:+.3f} | {:+.3f} | {:+.3f} | {:.2f} | {:.2f} |\n",
+                     e.sent_error(), e.near_worst(), e.far_worst(), e.silent_error(), e.sender_spread_error(),
+                     e.run_spread_error(), e.log_likelihood(), e.deficit());
+}
+
+void Loop::write_tables(const identification::RadioFit& fit) const {
   std::string table =
       "| effect | evidence | added | set | sent | near | far | silent | senders | runs | likelihood | deficit "
       "|\n"
       "|---|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const Step& step : steps_) {
-    Json errors;
-    for (std::size_t q = 0; q < step.errors.size(); ++q) {
-      const Errors& e = step.errors[q];
-      errors[train_[q].name] = json_of(e);
-      table += fmt::format(
-          "| {} | {} | {} | {} | {:+.1f} | {:.3f} | {:.3f} | {:+.3f} | {:+.3f} | {:+.3f} | {:.2f} | {:.2f} |\n",
-          q == 0 ? step.name : "", q == 0 ? step.evidence : "", q == 0 ? step.added : "", train_[q].name, e.sent,
-          e.near_worst, e.far_worst, e.silent, e.sender_spread, e.run_spread, e.log_likelihood, e.deficit);
-    }
-    result["effects"].push_back(Json{{"name", step.name},
-                                     {"covariates", step.covariates},
-                                     {"acts_on", "radio"},
-                                     {"evidence", step.figures},
-                                     {"parameters", Json{{"added", step.added}}},
-                                     {"errors", errors}});
+    for (std::size_t q = 0; q < step.errors.size(); ++q)
+      table += fmt::format("| {} | {} | {} | {} | {}", q == 0 ? step.name : "", q == 0 ? step.evidence : "",
+                           q == 0 ? step.added : "", train_[q].name, cells_of(entry_of(step.errors[q])));
   }
-  // Reference: the training runs as a prediction. No model of these robots can be expected to do better.
-  for (std::size_t q = 0; q < train_.size(); ++q) {
-    const Errors e = compare(test_[q], train_[q], train_[q]);
-    result["fitted_runs_themselves"][train_[q].name] = json_of(e);
-    table +=
-        fmt::format("| {} | | | {} | {:+.1f} | {:.3f} | {:.3f} | {:+.3f} | {:+.3f} | {:+.3f} | {:.2f} | {:.2f} |\n",
-                    q == 0 ? "training runs as prediction" : "", train_[q].name, e.sent, e.near_worst, e.far_worst,
-                    e.silent, e.sender_spread, e.run_spread, e.log_likelihood, e.deficit);
-  }
-  Json shared{{"range_mm", model_.range_mm},
-              {"pattern_db", model_.pattern_db},
-              {"body_loss_db", model_.body_loss_db},
-              {"power_sd_db", model_.power_sd_db},
-              {"sensitivity_sd_db", model_.sensitivity_sd_db},
-              {"power_bearing_sd_db", model_.power_bearing_sd_db},
-              {"sensitivity_bearing_sd_db", model_.sensitivity_bearing_sd_db},
-              {"pair_sd_db", model_.pair_sd_db},
-              {"link_sd_db", model_.link_sd_db},
-              {"laying_sd_db", model_.laying_sd_db},
-              {"packet_sd_db", timing_.packet_sd_db},
-              {"notice_db", timing_.notice_db},
-              {"oscillator_sd", timing_.oscillator_sd},
-              {"oscillator", std::vector<double>(timing_.oscillator.begin(), timing_.oscillator.end())}};
-  Json apart{{"correlation_of_power", same_robots(model_, true)},
-             {"correlation_of_sensitivity", same_robots(model_, false)}};
-  for (const LinkModel::Swarm& swarm : model_.swarms) apart["run_sd_db"][swarm.set] = swarm.run_sd_db;
-  result["shared"] = shared;
-  result["of_each_set"] = apart;
-  Json measured;
-  for (const GridSet& set : test_) measured[set.name] = statistics(set).sent;
-  result["measured_sent"] = measured;
-  result["population"] = population_;
-  write_text(options_.out / "result.json", result.dump(2) + "\n");
-
-  std::string bands =
+  for (std::size_t q = 0; q < train_.size(); ++q)
+    table += fmt::format("| {} | | | {} | {}", q == 0 ? "training runs as prediction" : "", train_[q].name,
+                         cells_of(fit.fitted_runs_themselves().at(train_[q].name)));
+  table +=
       "\n| set | rows, columns | mm | measured | fitted | population, 95 % of swarms "
       "|\n|---|---|---|---|---|---|\n";
-  for (const Json& row : population_) {
-    if (row.at("distance_mm").get<double>() > kNeverHeard_mm) continue;
+  for (const identification::PopulationClass& row : population_) {
+    if (row.distance_mm() > kNeverHeard_mm) continue;
     double fitted = 0;
     for (std::size_t q = 0; q < train_.size(); ++q) {
-      if (train_[q].name != row.at("set")) continue;
+      if (train_[q].name != row.set()) continue;
       for (const DisplacementClass& c : steps_.back().errors[q].simulated.classes) {
-        if (c.rows == row.at("rows") && c.columns == row.at("columns")) fitted = c.reception;
+        if (c.rows == row.rows() && c.columns == row.columns()) fitted = c.reception;
       }
     }
-    bands += fmt::format("| {} | {}, {} | {:.0f} | {:.3f} | {:.3f} | {:.2f}..{:.2f}{} |\n",
-                         row.at("set").get<std::string>(), row.at("rows").get<int>(), row.at("columns").get<int>(),
-                         row.at("distance_mm").get<double>(), row.at("measured").get<double>(), fitted,
-                         row.at("low").get<double>(), row.at("high").get<double>(),
-                         row.at("inside").get<bool>() ? "" : ", outside");
+    table += fmt::format("| {} | {}, {} | {:.0f} | {:.3f} | {:.3f} | {:.2f}..{:.2f}{} |\n", row.set(), row.rows(),
+                         row.columns(), row.distance_mm(), row.measured(), fitted, row.low(), row.high(),
+                         row.inside() ? "" : ", outside");
   }
-  write_text(options_.out / "effects.md", table + bands);
+  write_text(options_.out / "effects.md", table);
 }
 
 void Loop::write_figures() const {
@@ -549,7 +570,7 @@ void Loop::write_figures() const {
   write_plot(plot, options_.out / "effects.svg");
 }
 
-void Loop::go() {
+RadioFound Loop::go() {
   std::error_code error;
   std::filesystem::create_directories(options_.out, error);
   if (error) throw UserError(fmt::format("{}: cannot be made: {}", options_.out.string(), error.message()));
@@ -559,13 +580,15 @@ void Loop::go() {
   add_oscillators();
   add_carrier_sense();
   draw_population();
-  write_models();
-  write_result();
+  RadioFound found{result(), write_models()};
+  write_text(options_.out / "result.json", identify::json_of(found.fit).dump(2) + "\n");
+  write_tables(found.fit);
   write_figures();
+  return found;
 }
 
 }  // namespace
 
-void fit_radio(const FitOptions& options) { Loop(options).go(); }
+RadioFound fit_radio(const FitOptions& options) { return Loop(options).go(); }
 
 }  // namespace kilotwin::radio_fit

@@ -6,6 +6,9 @@
 #include <functional>
 #include <string>
 
+#include "idl/identification.pb.h"
+#include "idl/model.pb.h"
+
 namespace kilotwin::radio_fit {
 
 struct FitOptions {
@@ -19,8 +22,13 @@ struct FitOptions {
   std::function<void(double, const std::string&)> progress = {};
 };
 
-/// Writes model.txtpb (range, pattern, variances), model-SET.txtpb (with the robots of that set), result.json,
-/// effects.md (table) and figures. Throws UserError on unreadable data.
-void fit_radio(const FitOptions& options);
+struct RadioFound {
+  identification::RadioFit fit;
+  proto::Model model;  ///< range, pattern and variances, fitted to all sets; robots and pairs are random
+};
+
+/// Writes model.txtpb, model-SET.txtpb (with the robots of that set), result.json, effects.md (table) and figures into
+/// `out`. Throws UserError on unreadable data.
+RadioFound fit_radio(const FitOptions& options);
 
 }  // namespace kilotwin::radio_fit

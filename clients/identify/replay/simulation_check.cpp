@@ -8,12 +8,11 @@
 
 #include "clients/identify/replay/replay.hpp"
 #include "clients/identify/replay/track_statistics.hpp"
+#include "clients/identify/result/values.hpp"
 #include "core/os/worker_pool.hpp"
 
 namespace kilotwin::identify {
 namespace {
-
-using nlohmann::json;
 
 constexpr std::size_t kMostSeeds = 8, kFewestSeeds = 2;
 /// Bound on robots times ticks over all simulations of a model: about ten seconds of one core.
@@ -87,46 +86,54 @@ Tally sum_of(const Statistic& statistic, const std::vector<Tally>& tallies) {
   return sum;
 }
 
-json means_of(const Tally& tally) {
-  json out = json::array();
+/// Null where nothing was measured.
+JsonList means_of(const Tally& tally) {
+  JsonList out;
   for (std::size_t i = 0; i < tally.weight.size(); ++i)
-    out.push_back(tally.weight[i] > 0 ? json(tally.sum[i] / tally.weight[i]) : json());
+    *out.add_values() = tally.weight[i] > 0 ? json_value(tally.sum[i] / tally.weight[i]) : json_null();
   return out;
 }
 
 /// Plot data of a statistic, summed over all robots.
-void add_plot(json& out, const Statistic& statistic, const Tally& measured, const Tally& base, const Tally& full) {
+void add_plot(identification::Identification& out, const Statistic& statistic, const Tally& measured,
+              const Tally& base, const Tally& full) {
   switch (statistic.kind) {
-    case Statistic::Kind::kHistogram:
-      out["distributions"].push_back({{"name", statistic.name},
-                                      {"unit", statistic.unit},
-                                      {"edges", statistic.at},
-                                      {"measured", measured.weight},
-                                      {"base", base.weight},
-                                      {"simulated", full.weight}});
+    case Statistic::Kind::kHistogram: {
+      identification::Distribution& plot = *out.add_distributions();
+      plot.set_name(statistic.name);
+      plot.set_unit(statistic.unit);
+      assign(plot.mutable_edges(), statistic.at);
+      assign(plot.mutable_measured(), measured.weight);
+      assign(plot.mutable_base(), base.weight);
+      assign(plot.mutable_simulated(), full.weight);
       return;
-    case Statistic::Kind::kSquares:
-      out["msd"] = {{"lag_s", statistic.at},
-                    {"measured_mm2", means_of(measured)},
-                    {"base_mm2", means_of(base)},
-                    {"simulated_mm2", means_of(full)}};
+    }
+    case Statistic::Kind::kSquares: {
+      identification::Msd& plot = *out.mutable_msd();
+      assign(plot.mutable_lag_s(), statistic.at);
+      *plot.mutable_measured_mm2() = means_of(measured);
+      *plot.mutable_base_mm2() = means_of(base);
+      *plot.mutable_simulated_mm2() = means_of(full);
       return;
-    case Statistic::Kind::kMeans:
+    }
+    case Statistic::Kind::kMeans: {
       if (statistic.at.size() < 2) return;
-      out["speed_over_time"] = {{"time_s", statistic.at},
-                                {"measured_mm_s", means_of(measured)},
-                                {"base_mm_s", means_of(base)},
-                                {"simulated_mm_s", means_of(full)}};
+      identification::SpeedOverTime& plot = *out.mutable_speed_over_time();
+      assign(plot.mutable_time_s(), statistic.at);
+      *plot.mutable_measured_mm_s() = means_of(measured);
+      *plot.mutable_base_mm_s() = means_of(base);
+      *plot.mutable_simulated_mm_s() = means_of(full);
       return;
+    }
   }
 }
 
-std::string words_of(const json& statistics, bool decidable, const char* unit) {
-  if (!decidable) return fmt::format("Too few {}s for the permutation test.", unit);
+std::string words_of(const identification::Simulated& simulated, bool decidable) {
+  if (!decidable) return fmt::format("Too few {}s for the permutation test.", simulated.unit());
   std::vector<std::string> differ, differed;
-  for (const json& s : statistics) {
-    if (!s["agrees"].get<bool>()) differ.push_back(s["name"]);
-    if (s["base_p"].get<double>() < kSurprise) differed.push_back(s["name"]);
+  for (const identification::SimulatedStatistic& s : simulated.statistics()) {
+    if (!s.agrees().bool_value()) differ.push_back(s.name());
+    if (s.base_p() < kSurprise) differed.push_back(s.name());
   }
   std::string out = differ.empty() ? "Simulations of this model agree with the measured tracks in all of these"
                                    : fmt::format("Simulations of this model differ from the measured tracks in {}",
@@ -140,100 +147,125 @@ std::string words_of(const json& statistics, bool decidable, const char* unit) {
   return out;
 }
 
-}  // namespace
-
-json simulation_check(const WrittenModel& base, const WrittenModel& full, PreparedSet set, Tracks which,
-                      std::uint32_t threads) {
-  set.find_headings(full.fitted, threads);
-  const std::size_t runs = set.set().runs.size();
+/// What is compared: runs with their scenes, and all compared tracks.
+struct Comparable {
   std::vector<Played> played;
   std::vector<const Track*> tracks;
-  std::vector<std::uint32_t> robots;
-  double cost = 0;
-  for (std::size_t run = 0; run < runs; ++run) {
-    Played p{scene_of(base.fitted, set, run), scene_of(full.fitted, set, run), {}};
-    for (std::size_t r = 0; r < p.full.robots.size(); ++r) {
-      const Track* const track = p.full.robots[r].track;
-      if (!counts(*track, which)) continue;
-      p.compared.push_back(r);
-      tracks.push_back(track);
-      robots.push_back(track->robot);
+  std::vector<std::uint32_t> robots;  ///< of the tracks
+  double robot_ticks = 0;             ///< of one simulation
+  bool too_long = false;
+
+  Comparable(const WrittenModel& base, const WrittenModel& full, const PreparedSet& set, Tracks which) {
+    for (std::size_t run = 0; run < set.set().runs.size() && !too_long; ++run) {
+      Played p{scene_of(base.fitted, set, run), scene_of(full.fitted, set, run), {}};
+      for (std::size_t r = 0; r < p.full.robots.size(); ++r) {
+        const Track* const track = p.full.robots[r].track;
+        if (!counts(*track, which)) continue;
+        p.compared.push_back(r);
+        tracks.push_back(track);
+        robots.push_back(track->robot);
+      }
+      if (p.compared.empty()) continue;
+      too_long = p.full.duration_s() > kLongestPlay_s || p.full.duration_s() <= 0;
+      robot_ticks += identify::robot_ticks(p.full);
+      played.push_back(std::move(p));
     }
-    if (p.compared.empty()) continue;
-    if (p.full.duration_s() > kLongestPlay_s || p.full.duration_s() <= 0) return json::object();
-    cost += robot_ticks(p.full);
-    played.push_back(std::move(p));
   }
+};
+
+/// Tallies of the measured tracks, and of each simulation.
+struct AllTallies {
+  Tallies measured;
+  std::vector<Tallies> simulated;  ///< by seed: the base model if it differs, then the full model
+  std::size_t seeds, first_full;
+
+  AllTallies(const Comparable& of, const TrackStatistics& statistics, const Units& units, const WrittenModel& base,
+             const WrittenModel& full, std::uint32_t threads)
+      : seeds(static_cast<std::size_t>(
+            std::clamp(kMostRobotTicks / of.robot_ticks, double{kFewestSeeds}, double{kMostSeeds}))),
+        // Without effects both models are one.
+        first_full(full.fitted.terms.empty() ? 0 : seeds) {
+    for (const Statistic& s : statistics.list())
+      measured.emplace_back(units.count, Tally{std::vector<double>(s.bins()), std::vector<double>(s.bins())});
+    simulated.assign(first_full + seeds, measured);
+    std::size_t track = 0;
+    for (const Played& p : of.played) add_run(run_of(p.full, {}), p.compared, statistics, units, track, measured);
+    os::in_parallel(simulated.size(), threads, [&](std::size_t k) {
+      std::size_t at = 0;
+      for (std::size_t p = 0; p < of.played.size(); ++p) {
+        const Scene& scene = k < first_full ? of.played[p].base : of.played[p].full;
+        const proto::Model& written = k < first_full ? base.written : full.written;
+        const Run run = run_of(scene, play(scene, written, 1 + k % seeds + p * 1000));
+        add_run(run, of.played[p].compared, statistics, units, at, simulated[k]);
+      }
+      match_weights(measured, simulated[k]);
+    });
+  }
+
+  /// All robots and seeds of one model.
+  [[nodiscard]] Tally sum(const Statistic& statistic, std::size_t s, std::size_t first) const {
+    Tally all = sum_of(statistic, simulated[first][s]);
+    for (std::size_t k = first + 1; k < first + seeds; ++k) all.add(sum_of(statistic, simulated[k][s]));
+    return all;
+  }
+  [[nodiscard]] Comparison comparison(const Statistic& statistic, std::size_t s, std::size_t first) const {
+    std::vector<std::vector<Tally>> all;
+    for (std::size_t k = first; k < first + seeds; ++k) all.push_back(simulated[k][s]);
+    return compare(statistic, measured[s], all);
+  }
+};
+
+identification::SimulatedStatistic entry_of(const Statistic& statistic, std::size_t s, const AllTallies& tallies,
+                                            bool decidable) {
+  const Comparison is = tallies.comparison(statistic, s, tallies.first_full),
+                   was = tallies.first_full == 0 ? is : tallies.comparison(statistic, s, 0);
+  const double scale = statistic.kind == Statistic::Kind::kSquares ? 100 : 1;  // logarithms in per cent
+  identification::SimulatedStatistic entry;
+  entry.set_name(statistic.name);
+  entry.set_unit(statistic.distance_unit);
+  entry.set_distance(scale * is.distance);
+  entry.set_by_chance_95(scale * is.by_chance_95);
+  entry.set_p(is.p);
+  *entry.mutable_agrees() = decidable ? json_value(is.p >= kSurprise) : json_null();
+  entry.set_base_distance(scale * was.distance);
+  entry.set_base_p(was.p);
+  return entry;
+}
+
+}  // namespace
+
+void add_simulation_check(const WrittenModel& base, const WrittenModel& full, PreparedSet set, Tracks which,
+                          std::uint32_t threads, identification::Identification& out) {
+  set.find_headings(full.fitted, threads);
+  const Comparable comparable(base, full, set, which);
+  if (comparable.too_long) return;
   const BaseParameters& b = full.fitted.base;
-  const TrackStatistics statistics(tracks, full.fitted.walls, std::hypot(b.ahead_mm - b.centre_mm, b.left_mm));
-  if (statistics.list().empty() || cost * kFewestSeeds > kMostRobotTicks) return json::object();
-  const auto seeds =
-      static_cast<std::size_t>(std::clamp(kMostRobotTicks / cost, double{kFewestSeeds}, double{kMostSeeds}));
+  const TrackStatistics statistics(comparable.tracks, full.fitted.walls,
+                                   std::hypot(b.ahead_mm - b.centre_mm, b.left_mm));
+  if (statistics.list().empty() || comparable.robot_ticks * kFewestSeeds > kMostRobotTicks) return;
+  const Units units(comparable.robots);
+  const AllTallies tallies(comparable, statistics, units, base, full, threads);
 
-  const Units units(robots);
-  Tallies none;
-  for (const Statistic& s : statistics.list())
-    none.emplace_back(units.count, Tally{std::vector<double>(s.bins()), std::vector<double>(s.bins())});
-  Tallies measured = none;
-  std::size_t track = 0;
-  for (const Played& p : played) add_run(run_of(p.full, {}), p.compared, statistics, units, track, measured);
-  // Base model with each seed first, then the full model. Without effects both are one.
-  const std::size_t first_full = full.fitted.terms.empty() ? 0 : seeds;
-  std::vector<Tallies> simulated(first_full + seeds, none);
-  os::in_parallel(simulated.size(), threads, [&](std::size_t k) {
-    std::size_t at = 0;
-    for (std::size_t p = 0; p < played.size(); ++p) {
-      const Scene& scene = k < first_full ? played[p].base : played[p].full;
-      const proto::Model& written = k < first_full ? base.written : full.written;
-      const Run run = run_of(scene, play(scene, written, 1 + k % seeds + p * 1000));
-      add_run(run, played[p].compared, statistics, units, at, simulated[k]);
-    }
-    match_weights(measured, simulated[k]);
-  });
-
-  json out, list = json::array();
+  identification::Simulated& simulated = *out.mutable_result()->mutable_simulated();
+  simulated.set_engine(full.fitted.contacts ? "planar" : "kinematic");
+  simulated.set_seeds(static_cast<std::uint32_t>(tallies.seeds));
+  simulated.set_runs(static_cast<std::uint32_t>(comparable.played.size()));
+  simulated.set_units(static_cast<std::uint32_t>(units.count));
+  simulated.set_unit(units.by_robot ? "robot" : "track");
   const bool decidable = units.count >= kFewestUnits;
+  std::vector<identification::SimulatedStatistic> entries(statistics.list().size());
+  os::in_parallel(entries.size(), threads,
+                  [&](std::size_t s) { entries[s] = entry_of(statistics.list()[s], s, tallies, decidable); });
   bool agrees = true;
-  std::vector<json> entries(statistics.list().size());
-  os::in_parallel(entries.size(), threads, [&](std::size_t s) {
-    const Statistic& statistic = statistics.list()[s];
-    const auto of = [&](std::size_t first) {
-      std::vector<std::vector<Tally>> all;
-      for (std::size_t k = first; k < first + seeds; ++k) all.push_back(simulated[k][s]);
-      return compare(statistic, measured[s], all);
-    };
-    const Comparison is = of(first_full), was = first_full == 0 ? is : of(0);
-    const double scale = statistic.kind == Statistic::Kind::kSquares ? 100 : 1;  // logarithms in per cent
-    entries[s] = {{"name", statistic.name},
-                  {"unit", statistic.distance_unit},
-                  {"distance", scale * is.distance},
-                  {"by_chance_95", scale * is.by_chance_95},
-                  {"p", is.p},
-                  {"agrees", decidable ? json(is.p >= kSurprise) : json()},
-                  {"base_distance", scale * was.distance},
-                  {"base_p", was.p}};
-  });
   for (std::size_t s = 0; s < entries.size(); ++s) {
     const Statistic& statistic = statistics.list()[s];
-    list.push_back(entries[s]);
-    if (decidable) agrees = agrees && entries[s]["agrees"].get<bool>();
-    const auto sum = [&](std::size_t first) {
-      Tally all = sum_of(statistic, simulated[first][s]);
-      for (std::size_t k = first + 1; k < first + seeds; ++k) all.add(sum_of(statistic, simulated[k][s]));
-      return all;
-    };
-    add_plot(out, statistic, sum_of(statistic, measured[s]), sum(0), sum(first_full));
+    agrees = agrees && entries[s].agrees().bool_value();
+    *simulated.add_statistics() = std::move(entries[s]);
+    add_plot(out, statistic, sum_of(statistic, tallies.measured[s]), tallies.sum(statistic, s, 0),
+             tallies.sum(statistic, s, tallies.first_full));
   }
-  const char* const unit = units.by_robot ? "robot" : "track";
-  out["simulated"] = {{"engine", full.fitted.contacts ? "planar" : "kinematic"},
-                      {"seeds", seeds},
-                      {"runs", played.size()},
-                      {"units", units.count},
-                      {"unit", unit},
-                      {"statistics", list},
-                      {"agrees", decidable ? json(agrees) : json()},
-                      {"in_words", words_of(list, decidable, unit)}};
-  return out;
+  *simulated.mutable_agrees() = decidable ? json_value(agrees) : json_null();
+  simulated.set_in_words(words_of(simulated, decidable));
 }
 
 }  // namespace kilotwin::identify

@@ -2,9 +2,8 @@
 /// of simulated and measured tracks are compared.
 #pragma once
 
-#include <nlohmann/json.hpp>
-
 #include "clients/identify/fit/fitter.hpp"
+#include "idl/identification.pb.h"
 #include "idl/model.pb.h"
 
 namespace kilotwin::identify {
@@ -16,12 +15,9 @@ struct WrittenModel {
 };
 
 /// Compares the tracks of `set` that count (`which`) with simulations of both models.
-/// Estimates initial headings first. Returns
-///   simulated      {engine, seeds, robots, runs, unit, statistics [{name, unit, distance, by_chance_95, p, agrees,
-///                  base_distance, base_p}], agrees, in_words}; `agrees` is null with too few robots
-///   distributions, msd, speed_over_time   plot data (identify.hpp)
-/// Empty if the runs are too long to simulate or yield no statistic.
-[[nodiscard]] nlohmann::json simulation_check(const WrittenModel& base, const WrittenModel& full, PreparedSet set,
-                                              Tracks which, std::uint32_t threads);
+/// Estimates initial headings first. Fills result.simulated and the plots distributions, msd and speed_over_time. Fills
+/// nothing if the runs are too long to simulate or yield no statistic.
+void add_simulation_check(const WrittenModel& base, const WrittenModel& full, PreparedSet set, Tracks which,
+                          std::uint32_t threads, identification::Identification&);
 
 }  // namespace kilotwin::identify

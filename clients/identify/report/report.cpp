@@ -13,8 +13,11 @@
 #include "clients/identify/report/report_summary.hpp"
 #include "clients/identify/report/report_text.hpp"
 #include "clients/identify/report/report_unexplained.hpp"
+#include "clients/identify/result/result_json.hpp"
 #include "clients/report/html.hpp"
+#include "clients/report/templates.hpp"
 #include "core/os/files.hpp"
+#include "core/stats/distributions.hpp"
 
 namespace kilotwin::identify {
 
@@ -72,8 +75,7 @@ std::string figures_of(const json& object, const json& sd = {}) {
                                                   : "";
     if (value.is_string()) shown = escaped(value.get<std::string>());
     if (value.is_boolean()) shown = value.get<bool>() ? "yes" : "no";
-    constexpr double kNormal95 = 1.96;
-    if (const auto spread = number(sd, key.c_str())) shown += " ± " + figure(kNormal95 * *spread);
+    if (const auto spread = number(sd, key.c_str())) shown += " ± " + figure(stats::kNormal95 * *spread);
     if (!shown.empty()) table.row({escaped(html::with_unit(key)), shown});
   }
   return table.text("facts");
@@ -99,9 +101,8 @@ std::string better_lead(const json& contract) {
   return out;
 }
 
-/// Further tables of the document, one section each.
-std::string given_tables(const json& tables) {
-  std::string out;
+/// Further tables of the result, one section each.
+void add_tables(const json& tables, Sections& sections) {
   for (const json& given : tables) {
     std::vector<std::string> heads;
     for (const json& head : part(given, "head")) heads.push_back(escaped(head.get<std::string>()));
@@ -111,79 +112,89 @@ std::string given_tables(const json& tables) {
       for (const json& cell : row) cells.push_back(escaped(cell.get<std::string>()));
       table.row(cells);
     }
-    out += section(text(given, "id").c_str(), escaped(text(given, "title")).c_str(), escaped(text(given, "lead")),
-                   table.text());
+    sections.add(text(given, "id"), text(given, "title"), escaped(text(given, "lead")), table.text());
   }
-  return out;
+}
+
+/// Errors over the horizon, after each effect, and by robot.
+std::string improvement_plots(const json& document, Figures& figures) {
+  const json &result = part(document, "result"), &robots = part(result, "robots");
+  std::string out =
+      figures.place(plot_horizon(figures.plots(), part(document, "horizon")), "Prediction error over the horizon");
+  if (!part(result, "effects").empty())
+    out += figures.place(
+        plot_steps(figures.plots(), part(document, "steps"), errors_of(result).floor.value_or(std::nan(""))),
+        "Error after each accepted effect; dashed: noise floor");
+  const std::string by_robot =
+      figures.place(plot_robots(figures.plots(), robots), "Error per robot, largest first");
+  // A full-width plot if there are many robots.
+  constexpr std::size_t kMany = 24;
+  const bool many = robots.size() > kMany;
+  if (!many) out += by_robot;
+  if (!out.empty()) out = "<div class=\"grid\">" + out + "</div>\n";
+  return many ? out + by_robot : out;
+}
+
+/// Fitted parameters, and what was measured.
+std::string model_tables(const json& document) {
+  const json& result = part(document, "result");
+  std::string out;
+  const auto add = [&](const char* title, const std::string& table) {
+    if (!table.empty()) out += fmt::format("<div><h3>{}</h3>{}</div>\n", title, table);
+  };
+  add("Drive", figures_of(part(result, "base"), part(result, "base_sd")));
+  add("Noise", figures_of(part(result, "noise")));
+  add("Data", figures_of(part(document, "set")));
+  return out.empty() ? "" : "<div class=\"thirds\">" + out + "</div>";
+}
+
+void add_sections(const json& document, Figures& figures, Sections& sections) {
+  const json &result = part(document, "result"), &unexplained = part(result, "unexplained");
+  sections.add("why", "Effects", "", cards(result, document, figures));
+  sections.add("better", "Improvement", better_lead(result), improvement_plots(document, figures));
+  sections.add("unexplained", "What is left unexplained", escaped(text(unexplained, "in_words")),
+               unexplained_body(unexplained, figures));
+  add_tables(part(document, "tables"), sections);
+  sections.add("faults", "Faults of the data",
+               "Excluded before the fit. These are faults of the measurement, not properties of the robots.",
+               fault_list(result));
+  sections.add(
+      "maps", "Residual maps",
+      "Residuals over the arena, before and after, on the same colour scale. A good model leaves no pattern.",
+      maps(part(document, "maps"), figures));
+  sections.add("simulated", "Simulation check", simulated_lead(result), simulated_body(result, document, figures));
+  sections.add("traced", "Residuals over covariates",
+               "Mean residuals with two standard errors. A good model leaves means near 0.",
+               covariate_section(result, part(document, "covariate_plots"), figures));
+  sections.add("table", "Effects and their evidence", "", effects_table(result));
+  sections.add("ambiguous", "Ambiguous effects", "", ambiguous_list(result));
+  sections.add("rejected", "Rejected hypotheses",
+               "The most significant hypotheses that were not accepted. The thresholds correct for multiple tests.",
+               rejected_table(result));
+  sections.add("model", "Base model and data", escaped(text(part(result, "disc_centre"), "in_words")),
+               model_tables(document));
 }
 
 }  // namespace
 
-std::string report_html(const json& document) {
-  const json& contract = part(document, "contract");
-  const json& plots = part(document, "covariate_plots");
+std::string report_html(const identification::Identification& found) {
+  const json document = json_of(found);
+  const json &result = part(document, "result"), &given = part(document, "bars");
   Gnuplot gnuplot;
   Figures figures(gnuplot);
-  std::string page = fmt::format(
-      "<header><p class=\"kicker\">Kilotwin · identified from measured data</p><h1>{}</h1>\n<p "
-      "class=\"verdict\">{}</p>\n{}</header>\n",
-      text(document, "headline").empty() ? headline(contract) : escaped(text(document, "headline")),
-      text(document, "verdict").empty() ? verdict(contract) : escaped(text(document, "verdict")),
-      part(document, "bars").is_array() ? given_bars(part(document, "bars")) : bars(contract));
-  page += section("why", "Effects", "", cards(contract, document, figures));
-  const std::size_t effects = part(contract, "effects").is_array() ? part(contract, "effects").size() : 0;
-  const Errors errors = errors_of(contract);
-  std::string better =
-      figures.place(plot_horizon(gnuplot, part(document, "horizon")), "Prediction error over the horizon");
-  if (effects > 0) {
-    better += figures.place(plot_steps(gnuplot, part(document, "steps"), errors.floor.value_or(std::nan(""))),
-                            "Error after each accepted effect; dashed: noise floor");
-  }
-  const std::string robots =
-      figures.place(plot_robots(gnuplot, part(document, "robots")), "Error per robot, largest first");
-  // A full-width plot if there are many robots.
-  const json& all_robots = part(document, "robots");
-  const bool many = all_robots.is_array() && all_robots.size() > 24;
-  if (!many) better += robots;
-  if (!better.empty()) better = "<div class=\"grid\">" + better + "</div>\n";
-  if (many) better += robots;
-  page += section("better", "Improvement", better_lead(contract), better);
-  page +=
-      section("unexplained", "What is left unexplained", escaped(text(part(contract, "unexplained"), "in_words")),
-              unexplained_body(part(contract, "unexplained"), figures));
-  page += given_tables(part(document, "tables"));
-  page += section("faults", "Faults of the data",
-                  "Excluded before the fit. These are faults of the measurement, not properties of the robots.",
-                  fault_list(contract));
-  page += section(
-      "maps", "Residual maps",
-      "Residuals over the arena, before and after, on the same colour scale. A good model leaves no pattern.",
-      maps(part(document, "maps"), figures));
-  page += section("simulated", "Simulation check", simulated_lead(contract),
-                  simulated_body(contract, document, figures));
-  page += section("traced", "Residuals over covariates",
-                  "Mean residuals with two standard errors. A good model leaves means near 0.",
-                  covariate_section(contract, plots, figures));
-  page += section("table", "Effects and their evidence", "", effects_table(contract));
-  page += section("ambiguous", "Ambiguous effects", "", ambiguous_list(contract));
-  page +=
-      section("rejected", "Rejected hypotheses",
-              "The most significant hypotheses that were not accepted. The thresholds correct for multiple tests.",
-              rejected_table(contract));
-  std::string model;
-  for (const auto& [key, title] : {std::pair{"base", "Drive"}, {"noise", "Noise"}}) {
-    const std::string table = figures_of(part(contract, key), part(contract, (std::string(key) + "_sd").c_str()));
-    if (!table.empty()) model += fmt::format("<div><h3>{}</h3>{}</div>\n", title, table);
-  }
-  if (const std::string table = figures_of(part(document, "set")); !table.empty())
-    model += "<div><h3>Data</h3>" + table + "</div>\n";
-  page += section("model", "Base model and data", escaped(text(part(contract, "disc_centre"), "in_words")),
-                  model.empty() ? "" : "<div class=\"thirds\">" + model + "</div>");
-  return html::page("Kilotwin: identification report", figures.filled(std::move(page)));
+  Sections sections;
+  add_sections(document, figures, sections);
+  html::Data page{html::Data::type::object};
+  page.set("headline", found.has_headline() ? escaped(found.headline()) : headline(result));
+  page.set("verdict", found.has_verdict() ? escaped(found.verdict()) : verdict(result));
+  page.set("bars", given.empty() ? bars(result) : given_bars(given));
+  page.set("sections", sections.all());
+  return html::page("Kilotwin: identification report",
+                    figures.filled(html::rendered(html::templates::kIdentification, page)));
 }
 
-void write_report(const json& document, const std::filesystem::path& file) {
-  os::write_file(file, report_html(document));
+void write_report(const identification::Identification& found, const std::filesystem::path& file) {
+  os::write_file(file, report_html(found));
 }
 
 }  // namespace kilotwin::identify

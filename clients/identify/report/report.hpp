@@ -2,16 +2,17 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
+
+#include "idl/identification.pb.h"
 
 namespace kilotwin::identify {
 
-/// Renders the document (identify.hpp lists its keys). Absent entries are left out. gnuplot draws the plots.
+/// Renders a result of any kind of data. What it lacks is left out. gnuplot draws the plots.
 /// Throws RunError if it is missing.
-[[nodiscard]] std::string report_html(const nlohmann::json& document);
+[[nodiscard]] std::string report_html(const identification::Identification&);
 
 /// Writes the report. Throws RunError.
-void write_report(const nlohmann::json& document, const std::filesystem::path& file);
+void write_report(const identification::Identification&, const std::filesystem::path& file);
 
 }  // namespace kilotwin::identify

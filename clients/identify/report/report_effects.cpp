@@ -58,15 +58,14 @@ bool shows_target(const json& effect, const json& plot) {
                      [&](const std::string& word) { return acts_on.find(word) != std::string::npos; });
 }
 
-/// The plot that shows an effect best: over its covariate, of what it acts on, with the fitted curve, with the largest mean
-/// relative to its standard error.
+/// The plot that shows an effect best: over its covariate, of what it acts on, with the largest mean relative to
+/// its standard error.
 const json* plot_for(const json& effect, const json& plots) {
   const json* best = nullptr;
-  double best_strength = 0;
+  double best_strength = -1;
   for (const json& plot : plots) {
     if (!shares_covariate(effect, text(plot, "covariate")) || !shows_target(effect, plot)) continue;
-    const bool fitted = part(plot, "fitted").is_array();
-    const double strength = (fitted ? 1e6 : 1e-6) + pattern_of(plot, "before").first;
+    const double strength = pattern_of(plot, "before").first;
     if (strength <= best_strength) continue;
     best = &plot;
     best_strength = strength;

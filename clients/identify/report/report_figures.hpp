@@ -54,12 +54,23 @@ class Figures {
   std::map<std::size_t, std::string> alts_;
 };
 
-/// A section of the page; empty if its body is empty. `lead` and `body` are markup.
-[[nodiscard]] inline std::string section(const char* id, const char* title, const std::string& lead,
-                                         const std::string& body) {
-  if (body.empty()) return "";
-  return fmt::format("<section id=\"{}\"><h2>{}</h2>\n{}{}</section>\n", id, title,
-                     lead.empty() ? "" : "<p class=\"lead\">" + lead + "</p>\n", body);
-}
+/// The sections of the page, in its order. Those without a body are left out.
+class Sections {
+ public:
+  /// `lead` and `body` are markup.
+  void add(const std::string& id, const std::string& title, const std::string& lead, const std::string& body) {
+    if (body.empty()) return;
+    html::Data section{html::Data::type::object};
+    section.set("id", id);
+    section.set("title", title);
+    if (!lead.empty()) section.set("lead", lead);
+    section.set("body", body);
+    all_ << section;
+  }
+  [[nodiscard]] const html::Data& all() const { return all_; }
+
+ private:
+  html::Data all_{html::Data::type::list};
+};
 
 }  // namespace kilotwin::identify::report

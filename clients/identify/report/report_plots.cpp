@@ -8,6 +8,8 @@
 #include <map>
 #include <vector>
 
+#include "core/stats/quantiles.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -95,10 +97,7 @@ double reach(const json& map) {
       }
     }
   }
-  if (all.empty()) return 0;
-  const auto at = all.begin() + static_cast<std::ptrdiff_t>(static_cast<double>(all.size() - 1) * 0.98);
-  std::nth_element(all.begin(), at, all.end());
-  return *at;
+  return stats::lower_quantile(all, 0.98);
 }
 
 /// A round tick interval, about four per length.
@@ -184,15 +183,14 @@ PlotNumber plot_horizon(Gnuplot& plots, const json& horizon) {
 
 PlotNumber plot_covariate(Gnuplot& plots, const json& plot) {
   const std::vector<double> at = numbers(plot, "at"), before = numbers(plot, "before"),
-                            se = numbers(plot, "before_se"), after = numbers(plot, "after"),
-                            fitted = numbers(plot, "fitted");
+                            se = numbers(plot, "before_se"), after = numbers(plot, "after");
   if (at.size() < 2 || !any_finite(before)) return std::nullopt;
   std::vector<double> low(at.size(), kNaN), high(at.size(), kNaN);
   for (std::size_t k = 0; k < std::min({at.size(), before.size(), se.size()}); ++k) {
     low[k] = before[k] - 2 * se[k];
     high[k] = before[k] + 2 * se[k];
   }
-  std::string commands = block("d", {at, before, low, high, after, fitted});
+  std::string commands = block("d", {at, before, low, high, after});
   commands += axis("x", text(plot, "covariate"), text(plot, "unit")) +
               axis("y", text(plot, "target"), text(plot, "acts_on_unit"));
   commands +=
@@ -200,7 +198,6 @@ PlotNumber plot_covariate(Gnuplot& plots, const json& plot) {
       "graph 0.12, graph 0.14\n";
   commands += "plot $d using 1:2:3:4 with yerrorbars lt 1 lw 1.2 dt solid ps 0.45 title 'before'";
   if (any_finite(after)) commands += ", $d using 1:5 with points lt 2 title 'after'";
-  if (any_finite(fitted)) commands += ", $d using 1:6 with lines lt 4 title 'fitted effect'";
   return plots.add(kHalf_px, kLow_px, commands);
 }
 

@@ -1,5 +1,5 @@
-/// The report's plots, each from one entry of the document (identify.hpp lists its keys). An entry that is absent,
-/// empty or malformed gives no plot.
+/// The report's plots, each from one entry of the JSON of idl/identification.proto. An entry that is absent or
+/// empty gives no plot.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -13,7 +13,7 @@ using PlotNumber = std::optional<std::size_t>;
 
 /// Error over the horizon: before, after, noise floor.
 PlotNumber plot_horizon(Gnuplot&, const nlohmann::json& horizon);
-/// One residual over one covariate: before, after, and the fitted effect.
+/// One residual over one covariate: before and after.
 PlotNumber plot_covariate(Gnuplot&, const nlohmann::json& plot);
 /// Two residual components along x and y as arrows over the arena; `when`: "before" or "after".
 PlotNumber plot_arrows(Gnuplot&, const nlohmann::json& map_x, const nlohmann::json& map_y, const char* when);

@@ -18,7 +18,7 @@ struct Errors {
 [[nodiscard]] std::string verdict(const json& contract);
 /// The errors as bars, with their confidence intervals.
 [[nodiscard]] std::string bars(const json& contract);
-/// Bars of any quantity of the document. A bar starts at `from`.
+/// Bars of any quantity. A bar starts at `from`.
 [[nodiscard]] std::string given_bars(const json& bars);
 
 }  // namespace kilotwin::identify::report

@@ -1,4 +1,4 @@
-/// Texts and numbers of the report. Entries of the document may be absent or malformed.
+/// Texts and numbers of the report, from the JSON of a result (clients/identify/result). Entries may be absent.
 #pragma once
 
 #include <nlohmann/json.hpp>

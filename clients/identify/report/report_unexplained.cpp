@@ -41,8 +41,7 @@ std::string curve(const json& pattern, Figures& figures) {
                        {"unit", part(pattern, "units")[0]},
                        {"acts_on_unit", "mm"},
                        {"at", part(pattern, "at")},
-                       {"before", part(pattern, key)[0]},
-                       {"fitted", nullptr}};
+                       {"before", part(pattern, key)[0]}};
     out += figures.place(plot_covariate(figures.plots(), plot), "");
   }
   return out;

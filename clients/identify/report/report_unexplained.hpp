@@ -6,7 +6,7 @@
 
 namespace kilotwin::identify::report {
 
-/// Comparisons as a table, and the patterns of the error as plots. Empty if the document has none.
+/// Comparisons as a table, and the patterns of the error as plots. Empty if the result has none.
 [[nodiscard]] std::string unexplained_body(const json& unexplained, Figures&);
 
 }  // namespace kilotwin::identify::report

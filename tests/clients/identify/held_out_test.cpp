@@ -57,15 +57,15 @@ TEST(HeldOut, WithoutItNoErrorIsReported) {
   MeasuredSet set = driven_straight(2, 1, 40, 2);
   hold_out_part(set);
   const Identified found = identify(set, nullptr, {});
-  const auto& result = found.document.at("contract");
-  for (const char* when : {"before", "after"}) {
-    EXPECT_TRUE(result.at(when).at("rmse_mm").is_null()) << when;
-    EXPECT_EQ(result.at(when).at("rows"), 0) << when;
+  const identification::Result& result = found.found.result();
+  for (const identification::Accuracy* error : {&result.before(), &result.after()}) {
+    EXPECT_TRUE(error->rmse_mm().has_null_value());
+    EXPECT_TRUE(error->has_rows() && error->rows() == 0);
   }
-  EXPECT_EQ(result.at("held_out").at("kind"), "nothing");
-  EXPECT_NE(result.at("held_out").at("in_words").get<std::string>().find("Give a second run"), std::string::npos);
+  EXPECT_EQ(result.held_out().kind(), "nothing");
+  EXPECT_NE(result.held_out().in_words().find("Give a second run"), std::string::npos);
   EXPECT_TRUE(found.predictions.empty());
-  EXPECT_GT(result.at("noise_floor_mm").get<double>(), 0);
+  EXPECT_GT(result.noise_floor_mm(), 0);
   EXPECT_FALSE(found.model.SerializeAsString().empty());
 }
 
@@ -75,9 +75,9 @@ TEST(HeldOut, TracksWithoutAPredictedTimeGiveNoError) {
   for (Track& track : set.runs.back().tracks) track.samples.resize(8);
   hold_out_part(set);
   const Identified found = identify(set, nullptr, {});
-  const auto& result = found.document.at("contract");
-  EXPECT_TRUE(result.at("after").at("rmse_mm").is_null());
-  EXPECT_EQ(result.at("held_out").at("kind"), "no predicted time");
+  const identification::Result& result = found.found.result();
+  EXPECT_TRUE(result.after().rmse_mm().has_null_value());
+  EXPECT_EQ(result.held_out().kind(), "no predicted time");
 }
 
 TEST(HeldOut, HalfOfItChooses) {
@@ -150,15 +150,14 @@ TEST(FinalCheck, AnEffectThatHoldsInTheFitOnlyIsNotWritten) {
   swing(last, -1);
   set.runs = {first.runs[0], first.runs[1], last.runs[2]};
   const Identified found = identify(set, nullptr, {});
-  const auto& result = found.document.at("contract");
-  EXPECT_LE(result.at("after").at("rmse_mm").get<double>(),
-            1.001 * result.at("before").at("rmse_mm").get<double>());
-  const auto& check = result.at("check");
-  ASSERT_GE(check.at("path").size(), 2U);
+  const identification::Result& result = found.found.result();
+  EXPECT_LE(result.after().rmse_mm().number_value(), 1.001 * result.before().rmse_mm().number_value());
+  const identification::Check& check = result.check();
+  ASSERT_GE(check.path_size(), 2);
   // The search accepted something, and its last model would have been worse.
-  EXPECT_GT(check.at("path").back().at("rmse_mm").get<double>(), check.at("path")[0].at("rmse_mm").get<double>());
-  EXPECT_FALSE(check.at("dropped").empty());
-  EXPECT_TRUE(result.at("effects").empty());
+  EXPECT_GT(check.path().rbegin()->rmse_mm(), check.path(0).rmse_mm());
+  EXPECT_FALSE(check.dropped().empty());
+  EXPECT_TRUE(result.effects().empty());
 }
 
 TEST(FinalCheck, ATestSetDoesNotChoose) {
@@ -169,17 +168,16 @@ TEST(FinalCheck, ATestSetDoesNotChoose) {
   swing(unlike, -1);
   const Identified one = identify(train, &like, {}), other = identify(train, &unlike, {});
   EXPECT_EQ(one.model.SerializeAsString(), other.model.SerializeAsString());
-  const auto& result = one.document.at("contract");
-  ASSERT_FALSE(result.at("effects").empty());
-  for (const auto& effect : result.at("effects"))
-    EXPECT_GT(effect.at("evidence").at("held_out_gain").get<double>(), 0);
-  EXPECT_LT(result.at("after").at("rmse_mm").get<double>(), 0.5 * result.at("before").at("rmse_mm").get<double>());
-  EXPECT_FALSE(result.at("check").contains("in_words"));
+  const identification::Result& result = one.found.result();
+  ASSERT_FALSE(result.effects().empty());
+  for (const identification::Effect& effect : result.effects())
+    EXPECT_GT(effect.evidence().held_out_gain().number_value(), 0);
+  EXPECT_LT(result.after().rmse_mm().number_value(), 0.5 * result.before().rmse_mm().number_value());
+  EXPECT_FALSE(result.check().has_in_words());
   // The written model is worse than the base model there, and the result says so.
-  const auto& worse = other.document.at("contract");
-  EXPECT_GT(worse.at("after").at("rmse_mm").get<double>(), worse.at("before").at("rmse_mm").get<double>());
-  EXPECT_NE(worse.at("check").at("in_words").get<std::string>().find("larger than that of the base model"),
-            std::string::npos);
+  const identification::Result& worse = other.found.result();
+  EXPECT_GT(worse.after().rmse_mm().number_value(), worse.before().rmse_mm().number_value());
+  EXPECT_NE(worse.check().in_words().find("larger than that of the base model"), std::string::npos);
 }
 
 }  // namespace

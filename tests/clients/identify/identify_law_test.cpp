@@ -127,11 +127,10 @@ TEST(Identify, ParametersAreRecovered) {
 TEST(Identify, NoEffectInDataWithoutEffects) {
   const MeasuredSet train = played({}, 11, 8, 2, 100), test = played({}, 12, 8, 1, 60);
   const Identified found = identify(train, &test, {});
-  const auto& result = found.document.at("contract");
-  EXPECT_TRUE(result.at("effects").empty()) << result.at("effects").dump();
+  const identification::Result& result = found.found.result();
+  EXPECT_TRUE(result.effects().empty()) << result.DebugString();
   EXPECT_EQ(found.predictions.size(), 8u * 11);
-  EXPECT_NEAR(result.at("before").at("rmse_mm").get<double>(), result.at("noise_floor_mm").get<double>(),
-              0.35 * result.at("noise_floor_mm").get<double>());
+  EXPECT_NEAR(result.before().rmse_mm().number_value(), result.noise_floor_mm(), 0.35 * result.noise_floor_mm());
 }
 
 TEST(Identify, SlowingOverTimeIsAttributedToTime) {
@@ -139,10 +138,11 @@ TEST(Identify, SlowingOverTimeIsAttributedToTime) {
   world.slowing_s = 150;
   const MeasuredSet train = played(world, 21, 8, 2, 100), test = played(world, 22, 8, 1, 60);
   const Identified found = identify(train, &test, {});
-  const auto& result = found.document.at("contract");
-  ASSERT_EQ(result.at("effects").size(), 1u) << result.at("effects").dump();
-  EXPECT_EQ(result.at("effects")[0].at("covariates"), nlohmann::json::array({"time"}));
-  EXPECT_LT(result.at("after").at("rmse_mm").get<double>(), result.at("before").at("rmse_mm").get<double>());
+  const identification::Result& result = found.found.result();
+  ASSERT_EQ(result.effects_size(), 1) << result.DebugString();
+  ASSERT_EQ(result.effects(0).covariates_size(), 1);
+  EXPECT_EQ(result.effects(0).covariates(0), "time");
+  EXPECT_LT(result.after().rmse_mm().number_value(), result.before().rmse_mm().number_value());
   bool written = false;
   for (const auto& effect : found.model.effect()) written = written || effect.name().starts_with("speed-by-time");
   EXPECT_TRUE(written);

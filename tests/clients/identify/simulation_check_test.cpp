@@ -78,28 +78,31 @@ void perform(MeasuredSet& set, const MotionModel& model, std::uint64_t seed) {
     for (std::size_t t = 0; t < set.runs[run].tracks.size(); ++t) set.runs[run].tracks[t].samples = samples[run][t];
 }
 
-nlohmann::json checked(MeasuredSet& set, const MotionModel& base, const MotionModel& full) {
+identification::Identification checked(MeasuredSet& set, const MotionModel& base, const MotionModel& full) {
   PreparedSet prepared(set);
   const proto::Model written_base = proto_of(base), written_full = proto_of(full);
-  return simulation_check({base, written_base}, {full, written_full}, prepared, Tracks::kAll, 2);
+  identification::Identification found;
+  add_simulation_check({base, written_base}, {full, written_full}, prepared, Tracks::kAll, 2, found);
+  return found;
 }
 
 TEST(SimulationCheck, TheGeneratingModelAgrees) {
   MeasuredSet set = commanded(12, 2, 120, 3);
   const MotionModel truth = slowing(12, 0.4), without = slowing(12, 0);
   perform(set, truth, 77);
-  const nlohmann::json found = checked(set, without, truth);
-  const nlohmann::json& result = found.at("simulated");
-  EXPECT_TRUE(result.at("agrees").get<bool>()) << result.dump(1);
-  EXPECT_EQ(result.at("units"), 12);
+  const identification::Identification found = checked(set, without, truth);
+  const identification::Simulated& simulated = found.result().simulated();
+  EXPECT_TRUE(simulated.agrees().bool_value()) << simulated.DebugString();
+  EXPECT_EQ(simulated.units(), 12U);
   bool speed_differs = false;
-  for (const auto& s : result.at("statistics"))
-    if (s.at("name") == "mean speed over the run")
-      speed_differs = s.at("base_p") < 0.01 && s.at("base_distance") > 5 * s.at("distance").get<double>();
-  EXPECT_TRUE(speed_differs) << result.dump(1);
-  EXPECT_TRUE(found.contains("msd") && found.contains("distributions") && found.contains("speed_over_time"));
+  for (const identification::SimulatedStatistic& s : simulated.statistics())
+    if (s.name() == "mean speed over the run")
+      speed_differs = s.base_p() < 0.01 && s.base_distance() > 5 * s.distance();
+  EXPECT_TRUE(speed_differs) << simulated.DebugString();
+  EXPECT_TRUE(found.has_msd() && !found.distributions().empty() && found.has_speed_over_time());
   // With exchanged roles the full model differs.
-  EXPECT_FALSE(checked(set, truth, without).at("simulated").at("agrees").get<bool>());
+  const auto exchanged = checked(set, truth, without).result().simulated().agrees();
+  EXPECT_TRUE(exchanged.has_bool_value() && !exchanged.bool_value());
 }
 
 TEST(SimulationCheck, FalseAlarmRate) {
@@ -110,8 +113,9 @@ TEST(SimulationCheck, FalseAlarmRate) {
   for (std::uint64_t seed = 0; seed < 24; ++seed) {
     MeasuredSet set = commanded(8, 1, 60, 100 + seed);
     perform(set, truth, 1000 * seed + 500);
-    const nlohmann::json found = checked(set, truth, truth);
-    for (const auto& s : found.at("simulated").at("statistics")) alarms += s.at("p") < 0.01 ? 1 : 0;
+    const identification::Identification found = checked(set, truth, truth);
+    for (const identification::SimulatedStatistic& s : found.result().simulated().statistics())
+      alarms += s.p() < 0.01 ? 1 : 0;
   }
   EXPECT_LE(alarms, 6);
 }
@@ -120,7 +124,7 @@ TEST(SimulationCheck, IsDeterministic) {
   MeasuredSet set = commanded(8, 1, 40, 9);
   const MotionModel truth = slowing(8, 0.4), without = slowing(8, 0);
   perform(set, truth, 7);
-  EXPECT_EQ(checked(set, without, truth).dump(), checked(set, without, truth).dump());
+  EXPECT_EQ(checked(set, without, truth).SerializeAsString(), checked(set, without, truth).SerializeAsString());
 }
 
 TEST(Replay, RobotsStartAtTheirMeasuredPoses) {

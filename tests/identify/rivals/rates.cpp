@@ -5,6 +5,8 @@
 #include <map>
 #include <optional>
 
+#include "core/stats/quantiles.hpp"
+
 namespace kilotwin::truth {
 namespace {
 
@@ -95,9 +97,7 @@ struct Area {
 /// The end of a range of positions if they pile up there, as at a wall; else infinite.
 double wall_of(std::vector<double> along, double sign) {
   for (double& c : along) c *= sign;
-  const auto end = along.end() - static_cast<std::ptrdiff_t>(along.size() / 1000 + 1);
-  std::nth_element(along.begin(), end, along.end());
-  const double edge = *end;
+  const double edge = stats::upper_end(along, along.size() / 1000);
   const auto within = [&](double from, double to) {
     return std::count_if(along.begin(), along.end(), [&](double c) { return c > edge - to && c <= edge - from; });
   };

@@ -65,9 +65,18 @@ std::vector<BristleRun> runs_of(const Truth& truth, std::uint64_t seed, std::siz
 
 std::set<std::string> found(const identify::Identified& identified) {
   std::set<std::string> names;
-  for (const auto& effect : identified.document.at("contract").at("effects"))
-    names.insert(effect.at("name").get<std::string>());
+  for (const identification::Effect& effect : identified.found.result().effects()) names.insert(effect.name());
   return names;
+}
+
+double before_mm(const identify::Identified& identified) {
+  return identified.found.result().before().rmse_mm().number_value();
+}
+double after_mm(const identify::Identified& identified) {
+  return identified.found.result().after().rmse_mm().number_value();
+}
+double parameter(const identification::Effect& effect, const char* name) {
+  return effect.parameters().fields().at(name).number_value();
 }
 
 identify::Options second() {
@@ -86,9 +95,7 @@ TEST(Bristle, NoEffectInDataWithoutEffects) {
 TEST(Bristle, ClockwiseHeadingsAreDetected) {
   const auto identified = identify_bristle(runs_of({.mirrored = true}, 50, 12), {}, second());
   EXPECT_TRUE(found(identified).contains("heading-sense"));
-  const auto& contract = identified.document.at("contract");
-  EXPECT_LT(contract.at("after").at("rmse_mm").get<double>(),
-            0.25 * contract.at("before").at("rmse_mm").get<double>());
+  EXPECT_LT(after_mm(identified), 0.25 * before_mm(identified));
   ASSERT_GE(identified.model.effect_size(), 1);
   EXPECT_NEAR(identified.model.effect(0).function(0).linear().at_zero(), 1.4, 0.1);
 }
@@ -103,13 +110,13 @@ TEST(Bristle, AnInclineCausesADownhillDrift) {
   const auto identified =
       identify_bristle(runs_of({.mirrored = true, .drift_x = -32, .drift_y = 8}, 90, 12), {}, second());
   EXPECT_TRUE(found(identified).contains("downhill"));
-  for (const auto& effect : identified.document.at("contract").at("effects")) {
-    if (effect.at("name") != "downhill") continue;
+  for (const identification::Effect& effect : identified.found.result().effects()) {
+    if (effect.name() != "downhill") continue;
     // Relative to the speed of 80 mm/s. These robots hardly turn: the drift only shows across their headings.
-    const double se = effect.at("parameters").at("se").get<double>();
+    const double se = parameter(effect, "se");
     EXPECT_LT(se, 0.07);
-    EXPECT_NEAR(effect.at("parameters").at("x").get<double>(), -0.4, 3 * se);
-    EXPECT_NEAR(effect.at("parameters").at("y").get<double>(), 0.1, 3 * se);
+    EXPECT_NEAR(parameter(effect, "x"), -0.4, 3 * se);
+    EXPECT_NEAR(parameter(effect, "y"), 0.1, 3 * se);
   }
 }
 
@@ -118,11 +125,11 @@ TEST(Bristle, TheSizeOfTheDriftDoesNotDependOnTheTrackersHeadings) {
       runs_of({.mirrored = true, .flips = true, .drift_x = 24, .drift_y = 24, .mount_rad = 0.4, .turn_rad_s = 0.15},
               110, 12),
       {}, second());
-  for (const auto& effect : identified.document.at("contract").at("effects")) {
-    if (effect.at("name") != "downhill") continue;
+  for (const identification::Effect& effect : identified.found.result().effects()) {
+    if (effect.name() != "downhill") continue;
     // Displacements in half a second are chords of the arc, at most 1 % short.
-    EXPECT_NEAR(effect.at("parameters").at("x").get<double>(), 0.3, 0.01);
-    EXPECT_NEAR(effect.at("parameters").at("y").get<double>(), 0.3, 0.01);
+    EXPECT_NEAR(parameter(effect, "x"), 0.3, 0.01);
+    EXPECT_NEAR(parameter(effect, "y"), 0.3, 0.01);
   }
   EXPECT_TRUE(found(identified).contains("downhill"));
 }
@@ -162,14 +169,11 @@ TEST(Bristle, TheMeasuredRunsShowTrackerEffects) {
   const auto names = found(identified);
   EXPECT_TRUE(names.contains("heading-sense"));
   EXPECT_TRUE(names.contains("front-for-back"));
-  const auto& contract = identified.document.at("contract");
-  EXPECT_LT(contract.at("after").at("rmse_mm").get<double>(),
-            0.75 * contract.at("before").at("rmse_mm").get<double>());
+  EXPECT_LT(after_mm(identified), 0.75 * before_mm(identified));
   // Runs differ by more than the effects, so gains are counted per run.
-  for (const auto& effect : contract.at("effects")) {
-    const auto& evidence = effect.at("evidence");
-    EXPECT_GT(evidence.at("held_out_gain").get<double>(), evidence.at("held_out_gain_se").get<double>())
-        << effect.at("name");
+  for (const identification::Effect& effect : identified.found.result().effects()) {
+    const identification::Evidence& evidence = effect.evidence();
+    EXPECT_GT(evidence.held_out_gain().number_value(), evidence.held_out_gain_se().number_value()) << effect.name();
   }
 }
 

@@ -1,12 +1,15 @@
-#include "clients/cli/identify/other_data.hpp"
+#include "clients/cli/identify/data_kinds.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <fstream>
+#include <utility>
 #include <vector>
 
 #include "clients/cli/identify/radio_data.hpp"
+#include "clients/cli/identify/trajectory_data.hpp"
 #include "clients/identify/bristle/identify_bristle.hpp"
 #include "clients/identify/data/import.hpp"
 #include "clients/identify/kilogrid/identify_floor.hpp"
@@ -54,9 +57,34 @@ std::string contents_of(const fs::path& directory) {
   return text;
 }
 
+bool has_tracks(const fs::path& data) {
+  return identify::has_trajectories(data) || !identify::importable(data).empty();
+}
+
+identify::Identified identify_floor_data(const fs::path& train, const fs::path& test, const fs::path&,
+                                         const identify::Options& options) {
+  std::vector<kilogrid::FloorRun> held_out;
+  if (!test.empty()) held_out = kilogrid::read_floor_runs(test);
+  return kilogrid::identify_floor(kilogrid::read_floor_runs(train), std::move(held_out), options);
+}
+
+identify::Identified identify_bristle_data(const fs::path& train, const fs::path& test, const fs::path&,
+                                           const identify::Options& options) {
+  std::vector<bristle::BristleRun> held_out;
+  if (!test.empty()) held_out = bristle::read_bristle_runs(test);
+  return bristle::identify_bristle(bristle::read_bristle_runs(train), std::move(held_out), options);
+}
+
+/// In the order in which they are recognised: the columns of a recording include those of a Kilogrid run.
+constexpr std::array<DataKind, 4> kDataKinds = {
+    {{"trajectories", has_tracks, identify_trajectories, true},
+     {"Kilogrid runs", kilogrid::has_floor_runs, identify_floor_data, false},
+     {"bristle plate tracks", bristle::has_bristle_runs, identify_bristle_data, false},
+     {"radio counts (comm_tau*_run*.dat)", has_radio_runs, identify_radio_runs, false}}};
+
 }  // namespace
 
-void demand_known_data(const std::string& option, const fs::path& data) {
+const DataKind& kind_of_data(const std::string& option, const fs::path& data) {
   std::error_code ignored;
   if (!fs::exists(data, ignored))
     throw UserError(
@@ -65,9 +93,9 @@ void demand_known_data(const std::string& option, const fs::path& data) {
     throw UserError(fmt::format(
         "{} {}: is a file{}; expected a directory that holds {}", option, data.string(),
         data.extension() == ".csv" ? fmt::format(" with the columns \"{}\"", columns_of(data)) : "", kExpected));
-  if (identify::has_trajectories(data) || !identify::importable(data).empty() || kilogrid::has_floor_runs(data) ||
-      bristle::has_bristle_runs(data) || has_radio_runs(data))
-    return;
+  for (const DataKind& kind : kDataKinds) {
+    if (kind.holds(data)) return kind;
+  }
   if (fs::exists(data / "recording.ktrec", ignored)) {
     throw UserError(
         fmt::format("{} {}: is a run; write its poses into a directory of data first: kilotwin export {} "
@@ -78,38 +106,6 @@ void demand_known_data(const std::string& option, const fs::path& data) {
       fmt::format("{} {}: {}; expected {}, or ARK logs (*.tsv, *.txt, *.log), or files of kilotwin "
                   "export --trajectories",
                   option, data.string(), contents_of(data), kExpected));
-}
-
-std::optional<identify::Identified> identify_other_data(const fs::path& train, const fs::path& test,
-                                                        const fs::path& out, const identify::Options& options) {
-  // The columns of a recording include those of a Kilogrid run.
-  if (identify::has_trajectories(train) || !identify::importable(train).empty()) return std::nullopt;
-  if (options.draws > 0)
-    throw UserError(fmt::format(
-        "--draws: models are drawn from the posterior of a fit to trajectories, and {} holds other data",
-        train.string()));
-  const auto same_kind = [&](bool is, const char* kind) {
-    if (!test.empty() && !is)
-      throw UserError(
-          fmt::format("--test {}: does not hold {}; give the same kind of data as --train", test.string(), kind));
-  };
-  if (kilogrid::has_floor_runs(train)) {
-    same_kind(test.empty() || kilogrid::has_floor_runs(test), "Kilogrid runs");
-    return kilogrid::identify_floor(
-        kilogrid::read_floor_runs(train),
-        test.empty() ? std::vector<kilogrid::FloorRun>{} : kilogrid::read_floor_runs(test), options);
-  }
-  if (bristle::has_bristle_runs(train)) {
-    same_kind(test.empty() || bristle::has_bristle_runs(test), "bristle plate tracks");
-    return bristle::identify_bristle(
-        bristle::read_bristle_runs(train),
-        test.empty() ? std::vector<bristle::BristleRun>{} : bristle::read_bristle_runs(test), options);
-  }
-  if (has_radio_runs(train)) {
-    same_kind(test.empty() || has_radio_runs(test), "radio counts (comm_tau*_run*.dat)");
-    return identify_radio_runs(train, test, out, options);
-  }
-  return std::nullopt;
 }
 
 }  // namespace kilotwin::cli

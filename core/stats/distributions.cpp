@@ -1,0 +1,35 @@
+#include "core/stats/distributions.hpp"
+
+#include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
+#include <boost/math/special_functions/gamma.hpp>
+
+namespace kilotwin::stats {
+
+double chi_squared_tail(double x, double degrees) {
+  return boost::math::gamma_q(degrees / 2, std::max(x, 0.0) / 2);
+}
+
+/// By the continued fraction of the incomplete gamma function in its tail, in logarithms: gamma_q() underflows there.
+double log10_chi_squared_tail(double x, double degrees) {
+  const double a = degrees / 2, y = std::max(x, 0.0) / 2;
+  if (y < a + 1) return std::log10(std::max(1e-300, chi_squared_tail(x, degrees)));
+  constexpr double kTiny = 1e-300;
+  double b = y + 1 - a, c = 1 / kTiny, d = 1 / b, h = d;
+  for (int i = 1; i < 500; ++i) {
+    const double an = -i * (i - a);
+    b += 2;
+    d = 1 / (std::abs(an * d + b) < kTiny ? kTiny : an * d + b);
+    c = std::abs(b + an / c) < kTiny ? kTiny : b + an / c;
+    const double ratio = d * c;
+    h *= ratio;
+    if (std::abs(ratio - 1) < 1e-12) break;
+  }
+  return (a * std::log(y) - y - std::lgamma(a) + std::log(h)) / std::log(10.0);
+}
+
+double student_quantile(double p, double degrees) {
+  return boost::math::quantile(boost::math::students_t(degrees), p);
+}
+
+}  // namespace kilotwin::stats
