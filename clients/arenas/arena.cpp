@@ -112,7 +112,8 @@ double Arena::variable(std::size_t index, std::uint32_t robot) const {
   }
   const VariablePlace* const place = place_of(index, robot);
   const comm::RadioCounter* const counter = comm::radio_counter(name_of(index));
-  if (place == nullptr && counter != nullptr) return engines_.radio().radio_counts()[robot].*counter->count;
+  if (place == nullptr && counter != nullptr && plan_->program_of(robot) != kNoProgram)
+    return engines_.radio().radio_counts()[robot].*counter->count;
   if (place == nullptr) return std::numeric_limits<double>::quiet_NaN();
   const std::optional<std::uint64_t> raw = place->fetch(robot, behaviours::HostMemory(host_of(robot)));
   return raw ? place->number(*raw) : std::numeric_limits<double>::quiet_NaN();

@@ -283,10 +283,10 @@ identification::DiscCentre disc_centre_of(const MotionModel& model) {
       tracked ? "at the tracked point"
               : fmt::format("{:.1f} mm ahead of the drive's reference point", model.base.centre_mm);
   const double evidence = model.centre_evidence;
-  const std::string why = evidence == 0 ? "assumed: these data do not tell it"
+  const std::string why = evidence == 0 ? "assumed: not identifiable from these data"
                           : evidence > kTold
-                              ? fmt::format("told by contacts, by {:.0f} nat of log likelihood", evidence)
-                              : std::string("told by how near robots come to each other");
+                              ? fmt::format("determined by contacts, with {:.0f} nat of log likelihood", evidence)
+                              : std::string("determined by how near robots come to each other");
   identification::DiscCentre out;
   out.set_ahead_mm(model.base.centre_mm);
   out.set_at_tracked_point(tracked);

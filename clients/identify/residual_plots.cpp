@@ -33,6 +33,12 @@ constexpr std::size_t kBins = 24, kCells = 14;
 /// Farther neighbours count as this far.
 constexpr double kFarthest_mm = 400;
 
+/// The value of a covariate by which a disturbance is plotted.
+double plotted(const Disturbance& d, const Quantity& covariate) {
+  const double value = d.*covariate.value;
+  return covariate.value == &Disturbance::nearest_mm ? std::min(value, kFarthest_mm) : value;
+}
+
 /// The central 99 %, by a part of the disturbances.
 template <class Of> std::pair<double, double> range_of(const std::vector<Disturbance>& all, Of&& of) {
   std::vector<double> values;
@@ -52,9 +58,9 @@ struct BinMeans {
            const Quantity& target) {
     std::array<double, kBins> square{}, count{};
     for (const Disturbance& d : all) {
-      const double part = (d.*covariate.value - range.first) / (range.second - range.first);
-      if (!(part >= 0 && part < 1)) continue;
-      const auto bin = static_cast<std::size_t>(part * kBins);
+      const double part = (plotted(d, covariate) - range.first) / (range.second - range.first);
+      if (!(part >= 0 && part <= 1)) continue;
+      const std::size_t bin = std::min(static_cast<std::size_t>(part * kBins), kBins - 1);
       mean[bin] += d.*target.value;
       square[bin] += d.*target.value * (d.*target.value);
       count[bin] += 1;
@@ -111,8 +117,7 @@ void add_residual_plots(identification::Identification& out, const std::vector<D
                         const std::vector<Disturbance>& after) {
   if (before.empty()) return;
   for (const Quantity& covariate : kPlotCovariates) {
-    const auto range =
-        range_of(before, [&](const Disturbance& d) { return std::min(d.*covariate.value, kFarthest_mm); });
+    const auto range = range_of(before, [&](const Disturbance& d) { return plotted(d, covariate); });
     if (!(range.second > range.first)) continue;
     for (const Quantity& target : kTargets) {
       const BinMeans was(before, covariate, range, target), is(after, covariate, range, target);

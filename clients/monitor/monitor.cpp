@@ -35,8 +35,14 @@ std::vector<std::uint32_t> tracked_robots(const RunPlan& plan) {
 std::vector<bool> commanded_by_station(const RunPlan& plan, const MonitorSettings& settings,
                                        const CommandTable& declared) {
   std::vector<bool> robots(plan.robots(), false);
-  for (std::uint32_t robot = 0; robot < plan.robots() && !settings.station_commands.empty(); ++robot)
+  for (std::uint32_t robot = 0; robot < plan.robots() && !settings.station_commands.empty(); ++robot) {
     robots[robot] = plan.tracked(robot) && plan.program_of(robot) == kNoProgram && !declared.has(robot);
+    if (robots[robot] && plan.uid_of(robot) != robot)
+      throw UserError(
+          fmt::format("--station-commands: robot {} has the id {} in messages; number robots from first_uid: 0, or "
+                      "declare its commands with --commands FILE",
+                      robot, plan.uid_of(robot)));
+  }
   return robots;
 }
 
@@ -58,7 +64,8 @@ std::vector<std::uint32_t> watched_robots(const RunPlan& plan, const CommandTabl
     throw UserError(
         "--monitor: no tracked robot has known commands; give its group `says { shadow: true }` and a behaviour, "
         "or "
-        "declare the commands with --commands FILE, or name the station's with --station-commands");
+        "declare the commands with --commands FILE, or give the types of the station's motion messages by "
+        "--station-commands");
   }
   return robots;
 }
@@ -138,7 +145,9 @@ void Monitor::read_commands(const SwarmView& swarm) {
     const std::uint32_t robot = watched_[i];
     const LifeCycle life = LifeCycle{swarm.life_cycle[robot]};
     const bool is_unknown = life == LifeCycle::kFailed || life == LifeCycle::kFlat;
-    if (life == LifeCycle::kAbsent || (is_unknown && !declared_.has(robot))) robots_[i].lose();
+    // Before the station's first message nobody knows what the robot does.
+    const bool is_uncommanded = commanded_by_station_[robot] && !declared_.has(robot);
+    if (life == LifeCycle::kAbsent || (is_unknown && !declared_.has(robot)) || is_uncommanded) robots_[i].lose();
   }
 }
 

@@ -198,7 +198,9 @@ std::string scale_advice(std::optional<double> radius_px) {
   return fmt::format(
       "the robots' discs have a radius of {:.1f} pixels; below {:g}, robots that touch or lie in clutter are "
       "missed{}. "
-      "Use {:.1f} times the resolution, or mount the camera at {:.2f} of its height, or see a part of the arena",
+      "Use {:.1f} times the resolution, or mount the camera at {:.2f} of its height, or let the camera see a "
+      "smaller part of the "
+      "arena",
       *radius_px, kWellSeenRadius_px, *radius_px < kLeastRadius_px ? ", and many others too" : "", more, 1 / more);
 }
 

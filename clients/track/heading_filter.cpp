@@ -80,11 +80,12 @@ void HeadingFilter::mix(double dt_s, bool heading_is_seen) {
   const double leaves = 1 - std::exp(-kSwitching_1_s * dt_s);
   const double held = time_s_ - started_s_ < kKnownAfter_s ? kLeastWeight : kHeldShare;
   const double turned = heading_is_seen ? held : 0;
+  const auto others = static_cast<double>(kModes - (heading_is_seen ? 1 : 2));  // that kHeld may change to
   const auto share_of = [=](std::size_t from, std::size_t to) {
     // Nobody sees any more how it turns.
     if (from == kTurned && !heading_is_seen) return to == kStop || to == kHeld ? 0.5 : 0.0;
     if (!heading_is_seen && to == kTurned) return 0.0;
-    if (from >= kHeld) return from == to ? 1 - kHeldLasts * leaves : kHeldLasts * leaves / (kModes - 1);
+    if (from >= kHeld) return from == to ? 1 - kHeldLasts * leaves : kHeldLasts * leaves / others;
     if (from == to) return 1 - leaves;
     if (to == kHeld) return held * leaves;
     return to == kTurned ? turned * leaves : (1 - held - turned) * leaves / (kModes - 3);

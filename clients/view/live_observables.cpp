@@ -66,6 +66,7 @@ LiveObservables::LiveObservables(const proto::Experiment& experiment, std::uint3
 
 void LiveObservables::take(double time_s, const SwarmView& swarm, Clock::time_point now) {
   if (!own_->any() || now < next_ || (!time_s_.empty() && time_s <= time_s_.back())) return;
+  const auto began = Clock::now();
   proto::StateRecord state;
   state.mutable_x_mm()->Add(swarm.x_mm.begin(), swarm.x_mm.end());
   state.mutable_y_mm()->Add(swarm.y_mm.begin(), swarm.y_mm.end());
@@ -76,7 +77,7 @@ void LiveObservables::take(double time_s, const SwarmView& swarm, Clock::time_po
   time_s_.push_back(time_s);
   for (std::size_t i = 0; i < values.size(); ++i) values_[i].push_back(values[i]);
   if (time_s_.size() > kMostPoints) keep_every_second();
-  next_ = now + std::max<Clock::duration>(interval_, 10 * (Clock::now() - now));
+  next_ = now + std::max<Clock::duration>(interval_, 10 * (Clock::now() - began));
 }
 
 void LiveObservables::keep_every_second() {

@@ -177,11 +177,18 @@ void ArenaFields::load(std::span<const proto::PhysicsState* const> parts) {
         throw RunError("checkpoint: physics: unknown cell of a field");
       const std::int64_t index = index_of(fields_[f], number);
       if (index < 0) continue;
-      Cell* cell = &fields_[f].cells[static_cast<std::size_t>(index)];
+      Cell* const cell = &fields_[f].cells[static_cast<std::size_t>(index)];
+      Cell* to = cell;
       if (is_own(fields_[f], number)) hash_ -= hash_of(f, number, cell);
       const Cell entry{part->field_value(i), part->field_tick(i)};
-      // The entries of a trail's cell come in their order.
-      cell[entries_of(fields_[f].counts) == 2 && cell->value != 0 ? 1 : 0] = entry;
+      if (fields_[f].counts == Counts::kTrail) {
+        if (!(entry.value >= 1 && entry.value <= plan_.robots() && entry.value == std::floor(entry.value)) ||
+            cell[1].value != 0)
+          throw RunError("checkpoint: physics: a trail of an unknown robot; the file is damaged");
+        // The entries of a cell come in their order.
+        if (cell->value != 0) to = cell + 1;
+      }
+      *to = entry;
       if (is_own(fields_[f], number)) hash_ += hash_of(f, number, cell);
     }
   }

@@ -45,7 +45,8 @@ std::optional<std::uint32_t> number_in(std::string_view text, int base) {
 }
 
 /// Reads a .kconf file: sections `address` with lines `module:X-Y,...`, `x:A-B` (columns) or `y:A-B` (rows), each followed by a
-/// section `data` with one hexadecimal octet per line. A later section replaces the octets of an earlier one. `#` begins a comment.
+/// section `data` with one hexadecimal octet per line. A later section replaces the octets of an earlier one. A comment goes from `#` to
+/// the end of its line.
 class ConfigurationFile {
  public:
   ConfigurationFile(std::string file, ModuleAddress size) : file_(std::move(file)), size_(size) {}
@@ -54,8 +55,8 @@ class ConfigurationFile {
     std::istringstream lines(text);
     for (std::string raw; std::getline(lines, raw);) {
       ++line_;
-      const std::string_view line = trimmed(raw);
-      if (line.empty() || line.starts_with('#')) continue;
+      const std::string_view line = trimmed(std::string_view(raw).substr(0, raw.find('#')));
+      if (line.empty()) continue;
       if (line.starts_with("address")) {
         if (in_data_) addressed_.clear();
         in_data_ = false;

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint32_t kFormat = 2;
+constexpr std::uint32_t kFormat = 3;
 constexpr FileKind kPartFile{"KTWNCHKP", kFormat, "a part of a checkpoint", "resume from another checkpoint"};
 
 std::string deterministic_bytes(const google::protobuf::Message& message) {

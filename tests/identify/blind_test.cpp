@@ -1,5 +1,6 @@
 // Base model without measured headings: walls, disc centres, and pushes without rotation.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -13,7 +14,8 @@ namespace kilotwin {
 namespace {
 
 identify::MotionModel fitted(const truth::Scene& scene, std::uint64_t seed) {
-  const auto folder = std::filesystem::path(testing::TempDir()) / ("blind-" + scene.name);
+  const auto folder =
+      std::filesystem::path(testing::TempDir()) / ("blind-" + std::to_string(getpid()) + "-" + scene.name);
   truth::write_data(scene, truth::play(scene, seed).train, folder);
   const identify::MeasuredSet set = identify::load_measured_set(folder);
   std::filesystem::remove_all(folder);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <string>
@@ -31,7 +32,8 @@ inline truth::Play played(const truth::Scene& scene, std::uint64_t seed = 5) { r
 
 inline identify::MeasuredSet set_of(const truth::Scene& scene, const truth::Play& play) {
   const auto* const test = testing::UnitTest::GetInstance()->current_test_info();
-  const auto folder = std::filesystem::path(testing::TempDir()) / (std::string("general-") + test->name());
+  const auto folder =
+      std::filesystem::path(testing::TempDir()) / ("general-" + std::to_string(getpid()) + "-" + test->name());
   truth::write_data(scene, play.train, folder);
   identify::MeasuredSet set = identify::load_measured_set(folder);
   std::filesystem::remove_all(folder);

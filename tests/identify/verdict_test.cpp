@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -17,7 +18,8 @@ class VerdictTest : public testing::Test {
  protected:
   VerdictTest()
       : out_(std::filesystem::path(testing::TempDir()) /
-             testing::UnitTest::GetInstance()->current_test_info()->name()) {
+             ("verdict-" + std::to_string(getpid()) + "-" +
+              testing::UnitTest::GetInstance()->current_test_info()->name())) {
     std::filesystem::create_directories(out_);
     for (int i = 0; i < 40; ++i) oracle_.push_back({0, i / 8, 10.0 + 5 * (i % 8), {1.0 * i, 3}, {1.0 * i, 0}});
   }

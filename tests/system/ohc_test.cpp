@@ -303,7 +303,8 @@ TEST_F(Ohc, AStationShowsThatItLivesWhileAPluginComputes) {
   Process run({program(), "run", scratch_ / "slow.txtpb", "--quiet", "--domain", std::to_string(domain_), "--out",
                scratch_ / "run"},
               scratch_.path());
-  EXPECT_TRUE(eventually([&] { return statuses >= 5; }, 50)) << "the plugin is given up after 60 s";
+  ASSERT_TRUE(eventually([&] { return statuses >= 1; }, 120));
+  EXPECT_TRUE(eventually([&] { return statuses >= 5; }, 30)) << "the plugin is given up after 60 s";
   write(scratch_ / "go", "go");
   const Outcome outcome = run.wait(60);
   EXPECT_EQ(outcome.status, 0) << outcome.err;

@@ -117,7 +117,8 @@ int identify_data(const IdentifyArguments& arguments) {
                                 arguments.test.string(), kind.name));
   if (arguments.draws > 0 && !kind.has_draws)
     throw UserError(fmt::format(
-        "--draws: models are drawn from the posterior of a fit to trajectories, and {} holds other data",
+        "--draws: models are drawn from the posterior of a fit to trajectories, and {} holds other data; leave out "
+        "--draws",
         arguments.train.string()));
   const fs::path fallback = "identified";
   const fs::path out = make_plain_output(arguments.output, fallback, {arguments.train, arguments.test});

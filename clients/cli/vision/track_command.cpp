@@ -119,16 +119,16 @@ class ScaleCheck {
     constexpr int kPatience = 3;  ///< frames
     if (told_ || (!any_robot && ++empty_ < kPatience)) return;
     told_ = true;
-    tell(tracker, picture);
+    tell(tracker, picture, any_robot);
   }
   /// The source has ended.
   void end(const track::PictureTracker& tracker, const cv::Size& picture) const {
-    if (!told_ && empty_ > 0) tell(tracker, picture);
+    if (!told_ && empty_ > 0) tell(tracker, picture, false);
   }
 
  private:
-  static void tell(const track::PictureTracker& tracker, const cv::Size& picture) {
-    const std::string advice = track::scale_advice(tracker.radius_px(picture));
+  static void tell(const track::PictureTracker& tracker, const cv::Size& picture, bool any_robot) {
+    const std::string advice = track::scale_advice(any_robot ? tracker.radius_px(picture) : std::nullopt);
     if (!advice.empty()) warn("track: " + advice);
   }
   bool told_ = false;

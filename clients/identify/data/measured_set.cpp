@@ -8,6 +8,7 @@
 #include <map>
 
 #include "core/base/error.hpp"
+#include "core/base/utf8.hpp"
 #include "core/csv/csv_reader.hpp"
 #include "core/csv/csv_writer.hpp"
 
@@ -27,6 +28,11 @@ std::optional<fs::path> find_csv(const fs::path& directory, const char* stem) {
   return std::nullopt;
 }
 
+/// Names of runs enter the result, which is UTF-8.
+void demand_utf8(std::string_view run) {
+  if (!is_utf8(run)) throw UserError("the name of a run is not UTF-8; save the tables as UTF-8");
+}
+
 /// The tracks of a set while its files are read.
 class Builder {
  public:
@@ -38,6 +44,7 @@ class Builder {
     auto known = runs_.find(run);
     if (known == runs_.end()) {
       if (!make) return nullptr;
+      demand_utf8(run);
       known = runs_.emplace(std::string(run), runs_.size()).first;
       set_.runs.push_back({std::string(run), {}});
       tracks_.emplace_back();

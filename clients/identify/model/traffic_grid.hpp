@@ -49,7 +49,7 @@ class TrafficGrid {
   /// Robots may come in any order: gaps of their tracks are filled later.
   static void pass(Content* c, const Content& passage) {
     const std::size_t own = c[0].value == passage.value ? 0 : 1;
-    if (c[own].value != passage.value && passage.at_s < c[1].at_s) return;
+    if (c[1].value != 0 && c[own].value != passage.value && passage.at_s < c[1].at_s) return;
     if (c[own].value != passage.value || passage.at_s > c[own].at_s) c[own] = passage;
     if (c[1].value != 0 && (c[0].value == 0 || c[1].at_s >= c[0].at_s)) std::swap(c[0], c[1]);
   }

@@ -183,8 +183,10 @@ struct AllTallies {
              const WrittenModel& full, std::uint32_t threads)
       : seeds(static_cast<std::size_t>(
             std::clamp(kMostRobotTicks / of.robot_ticks, double{kFewestSeeds}, double{kMostSeeds}))),
-        // Without effects both models are one.
-        first_full(full.fitted.terms.empty() ? 0 : seeds) {
+        // Without effects and with the same lag both models are one.
+        first_full(full.fitted.terms.empty() && full.fitted.base.command_lag_s == base.fitted.base.command_lag_s
+                       ? 0
+                       : seeds) {
     for (const Statistic& s : statistics.list())
       measured.emplace_back(units.count, Tally{std::vector<double>(s.bins()), std::vector<double>(s.bins())});
     simulated.assign(first_full + seeds, measured);

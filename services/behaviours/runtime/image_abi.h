@@ -83,7 +83,7 @@ struct KtRobot {
   uint16_t stuck_ticks; /* host: ticks spent in a loop without exit */
   uint8_t loop_rate;    /* host: KT_LOOP_* */
   uint8_t looped;       /* host: the tick ended in a loop that reads no memory that an interrupt may change */
-  uint8_t spent;        /* host: 0; 1: the program has spent time in a delay or in a call */
+  uint8_t spent;        /* host: 0; 1: the program has spent time in a delay or in a call, or changed motors */
   uint8_t returned;     /* host: 0; 1: loop() has returned as often as the host wants to know */
 };
 

@@ -189,13 +189,14 @@ static uint32_t cycle_of_tick(void) {
 
 enum { FULL_DUTY = 255 };
 
-/* The duties are about to change. */
+/* The duties are about to change. A call of loop() that changes them is not skipped, even if it restores them. In callbacks after
+ * the program's own time, cycle_of_tick() is 0: what was counted stays counted. */
 static void note_duties(void) {
   struct KilotwinMotorPhases* motors = &kt_surroundings->motors;
-  const uint32_t now = cycle_of_tick();
-  const uint32_t cycles = now > motors->from ? now - motors->from : 0;
-  kilotwin_add_motors(motors, robot.duty_left, robot.duty_right, cycles);
+  const uint32_t cycle = cycle_of_tick(), now = cycle > motors->from ? cycle : motors->from;
+  kilotwin_add_motors(motors, robot.duty_left, robot.duty_right, now - motors->from);
   motors->from = now;
+  robot.spent = 1;
 }
 
 void set_motors(uint8_t left, uint8_t right) {
@@ -217,7 +218,11 @@ void set_motors(uint8_t left, uint8_t right) {
   robot.duty_right = right;
 }
 
-volatile uint8_t* kilotwin_motor_duty(uint8_t right) { return right ? &robot.duty_right : &robot.duty_left; }
+/* A write may follow. */
+volatile uint8_t* kilotwin_motor_duty(uint8_t right) {
+  note_duties();
+  return right ? &robot.duty_right : &robot.duty_left;
+}
 
 void spinup_motors(void) {
   set_motors(FULL_DUTY, FULL_DUTY);

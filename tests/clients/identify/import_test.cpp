@@ -2,6 +2,7 @@
 #include "clients/identify/data/import.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -21,7 +22,8 @@ class ImportTest : public testing::Test {
  protected:
   ImportTest()
       : folder_(fs::path(testing::TempDir()) /
-                ("import-" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()))) {
+                ("import-" + std::to_string(getpid()) + "-" +
+                 std::string(testing::UnitTest::GetInstance()->current_test_info()->name()))) {
     fs::remove_all(folder_);
     fs::create_directories(folder_ / "from");
     fs::create_directories(folder_ / "to");

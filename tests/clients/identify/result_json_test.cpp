@@ -36,6 +36,13 @@ TEST(ResultJson, UnknownNumbersAreNull) {
   EXPECT_EQ(written.at("before"), (json{{"rmse_mm", nullptr}, {"rows", 0}}));
   EXPECT_EQ(written.at("after"), (json{{"rmse_mm", nullptr}}));
   EXPECT_TRUE(written.at("unexplained").at("learner").is_null());
+  result.set_noise_floor_mm(std::numeric_limits<double>::quiet_NaN());
+  result.mutable_replicates()->set_floor_mm(-std::numeric_limits<double>::infinity());
+  result.add_faults()->set_run("NaN");
+  const json unknown = json_of(result);
+  EXPECT_TRUE(unknown.at("noise_floor_mm").is_null());
+  EXPECT_TRUE(unknown.at("replicates").at("floor_mm").is_null());
+  EXPECT_EQ(unknown.at("faults").at(0).at("run"), "NaN");
 }
 
 TEST(ResultJson, NumbersKeepTheirValues) {

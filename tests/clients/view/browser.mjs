@@ -24,22 +24,26 @@ export async function launchBrowser(npm) {
 
 /** A process that prints "kilotwin: open ADDRESS" on stderr. */
 export class Served {
-  static async start(words, cwd) {
+  /** Returns once the program has printed what `said` finds: by default the address of a page. */
+  static async start(words, cwd, said = /kilotwin: open (https?:\S+)/) {
     const served = new Served();
     served.process = spawn(words[0], words.slice(1), { cwd, stdio: ["ignore", "pipe", "pipe"] });
     served.ended = new Promise((resolve) => served.process.on("exit", (status, signal) => resolve(status ?? signal)));
     served.text = "";
     served.process.stdout.on("data", (data) => (served.text += data));
-    served.address = await new Promise((resolve, reject) => {
+    served.found = await new Promise((resolve, reject) => {
       served.process.stderr.on("data", (data) => {
         served.text += data;
-        const found = /kilotwin: open (https?:\S+)/.exec(served.text);
+        const found = said.exec(served.text);
         if (found) resolve(found[1]);
       });
-      served.process.on("exit", () => reject(new Error(`ended before it printed an address: ${served.text}`)));
+      served.process.on("exit", () => reject(new Error(`ended before it printed ${said}: ${served.text}`)));
       served.process.on("error", reject);
     });
-    served.port = Number(new URL(served.address).port);
+    if (served.found.startsWith("http")) {
+      served.address = served.found;
+      served.port = Number(new URL(served.address).port);
+    }
     return served;
   }
   async stop() {

@@ -54,7 +54,7 @@ class HeldRun : public NotedRun {
     ++plots_begun_;
     now_s_ += .01 + 1e-5 * plots_begun_;  // no two viewers have taken the same time
     changed_.notify_all();
-    changed_.wait(lock, [this] { return allowed_ >= plots_begun_; });
+    changed_.wait_for(lock, kLongest, [this] { return allowed_ >= plots_begun_; });
     return NotedRun::plot(number, robot);
   }
   [[nodiscard]] std::string robot(std::uint32_t robot, std::int64_t tick) override {

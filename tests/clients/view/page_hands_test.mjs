@@ -213,12 +213,13 @@ async function hybridRun() {
     tracking { bridge_s: 2 }
     door { name: "ceiling" log { format: ARK } position_sd_mm: 3 heading_sd_deg: 3 }`);
   const log = trackerLog();
-  const domain = 60 + (process.pid % 60);
-  const served = await serve([kilotwin, "run", experiment, "--pace", "4", "--domain", String(domain), "--monitor", "--warm-up", "5",
+  const served = await serve([kilotwin, "run", experiment, "--pace", "4", "--monitor", "--warm-up", "5",
     "--out", path.join(scratch, "hybrid"), "--view"]);
   const page = await open(served.address);
   await phase(page, "live: running");
-  const player = spawn(kilotwin, ["play", experiment, log, "--speed", "4", "--domain", String(domain)], { cwd: scratch, stdio: ["ignore", "ignore", "pipe"] });
+  await eventually("its domain", async () => /runs on DDS domain \d+/.test(served.text));
+  const [, domain] = /runs on DDS domain (\d+)/.exec(served.text);
+  const player = spawn(kilotwin, ["play", experiment, log, "--speed", "4", "--domain", domain], { cwd: scratch, stdio: ["ignore", "ignore", "pipe"] });
   try {
     // An ellipse around each of them, live: as wide as the tracker's standard deviation says, where the tracker sees the robot.
     const ellipses = async () => {

@@ -1,12 +1,12 @@
 // node page_test.mjs KILOTWIN VIEW SAMPLES NPM SOURCES [PICTURES]: the page in headless Chromium, as people use it.
 import assert from "node:assert/strict";
-import { execFileSync, spawn } from "node:child_process";
+import { execFileSync } from "node:child_process";
 import fs from "node:fs";
 import path from "node:path";
 import { eventually } from "./browser.mjs";
 import {
   clock, connected, counter, drawn, HALF_MM, kilotwin, newContext, onScreen, open, phase, picture, pictures, press, received, run, samples,
-  saved, scratch, serve, sources, text, viewProgram,
+  saved, scratch, serve, sources, start, text, viewProgram,
 } from "./page_tools.mjs";
 
 /** Where robot `i` of the sample is: tests/clients/view/recordings.hpp. */
@@ -370,10 +370,9 @@ async function liveRun() {
 
 /** Without the run's directory, observables of poses, LEDs and life cycles have curves, and the others say why not. */
 async function liveRunElsewhere() {
-  const domain = String(30 + (process.pid % 30));
-  const served = await serve([viewProgram, "view", "--domain", domain]);
+  const run = await start([kilotwin, "run", talkingExperiment(), "--pace", "1", "--out", path.join(scratch, "elsewhere")]);
+  const served = await serve([viewProgram, "view", "--domain", run.found]);
   const page = await open(served.address);
-  const run = spawn(kilotwin, ["run", talkingExperiment(), "--pace", "1", "--quiet", "--domain", domain, "--out", path.join(scratch, "elsewhere")]);
   await phase(page, "live: running");
   await press(page, "Plots");
   await eventually("the choice", async () => (await page.locator("#plots select").nth(0).locator("option").allTextContents()).includes("awake (observable)"));
@@ -381,7 +380,7 @@ async function liveRunElsewhere() {
   await eventually("the observable", async () => (await line(page, 1, "value")) === 1);
   await page.locator("#plots select").nth(1).selectOption({ label: "mean_rounds (observable)" });
   await eventually("the reason", async () => /mean_rounds uses rounds, which is in the run's recording only/.test(await page.locator("#plots .plot:nth-child(2) p").textContent()));
-  run.kill("SIGINT");
+  await run.stop();
   assert.deepEqual(page.faults, []);
   await page.close();
   assert.equal(await served.stop(), 0);

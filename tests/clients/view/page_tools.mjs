@@ -23,6 +23,13 @@ export async function serve(words) {
   return served;
 }
 
+/** A run, once it has printed its DDS domain, which is `found`. */
+export async function start(words) {
+  const run = await Served.start(words, scratch, /runs on DDS domain (\d+)/);
+  started.push(run);
+  return run;
+}
+
 /** A page that fails the test on any error, and on any request to another address. */
 export async function open(address, context = browser) {
   const page = await context.newPage({ viewport: { width: 1280, height: 720 } });
@@ -96,6 +103,6 @@ export async function run(...tests) {
   } finally {
     await browser.close();
     for (const served of started) await served.stop();
-    fs.rmSync(scratch, { recursive: true, force: true });
+    fs.rmSync(scratch, { recursive: true, force: true, maxRetries: 20, retryDelay: 100 });
   }
 }

@@ -23,9 +23,13 @@ typedef enum {
   CAN_MODULE_DATA = 19
 } CAN_message_type_t;
 
+typedef void (*CAN_message_rx_t)(CAN_message_t*);
+
 #ifdef __cplusplus
 extern "C" {
 #endif
+/* For messages of other modules. Never called: in the simulation modules exchange none. */
+extern CAN_message_rx_t module_CAN_message_rx;
 void init_CAN_message(CAN_message_t* message);
 /* A robot's report with the cell that heard it. */
 void serialize_tracking_message(CAN_message_t* message, uint8_t cell, tracking_user_data_t* data);

@@ -28,6 +28,7 @@ static void ignore_message(IR_message_t* message, cell_num_t cell, distance_meas
   (void)wrong;
 }
 static void ignore_success(cell_num_t cell) { (void)cell; }
+CAN_message_rx_t module_CAN_message_rx;
 IR_message_rx_t module_IR_message_rx = ignore_message;
 IR_message_tx_success_t module_IR_message_tx_success = ignore_success;
 

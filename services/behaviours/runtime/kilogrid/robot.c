@@ -70,6 +70,7 @@ static IR_message_t* next_queued(void) {
 }
 
 static void drop_queued(void) {
+  if (queue_length == 0) return; /* emptied while the message was on the air */
   queue_first = (queue_first + 1) % QUEUED;
   --queue_length;
 }

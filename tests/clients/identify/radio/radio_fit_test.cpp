@@ -1,5 +1,6 @@
 // Reading measured grids, simulating them, and recovering the parameters of simulated grids.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -43,7 +44,8 @@ TEST(GridRun, PausesAfterSuccess) {
 }
 
 TEST(GridData, ReadsBothFormsAndSkipsTruncatedLines) {
-  const std::filesystem::path directory = std::filesystem::path(::testing::TempDir()) / "grids";
+  const std::filesystem::path directory =
+      std::filesystem::path(::testing::TempDir()) / ("grids-" + std::to_string(getpid()));
   std::filesystem::create_directories(directory);
   std::ofstream(directory / "comm_tau000_run000.dat") << "0 9 1 2 3\n1 4 9 5 6\n2 7 8 9 1\n3 1 1 1 9\n";
   std::ofstream(directory / "comm_tau000_run001.dat") << "9 1 2 3\n4 9 5 6\n7 8\n1 1 1 9\n";

@@ -112,8 +112,6 @@ TEST_F(FirmwareRun, MovesWhenANativeRobotDoes) {
   EXPECT_TRUE(led.whole()) << led.first << ' ' << led.second << ' ' << led.same;
 }
 
-/// kilo_ticks has four octets, and the robot's processor reads them one by one. If the clock's interrupt comes in between while the
-/// lowest carries over, the program sees a time up to 255 ticks ahead.
 /// Programs that set their motors several times in a tick, and the part of the speed straight on that they reach.
 struct Pulses {
   const char* loop;
@@ -148,6 +146,8 @@ TEST_F(FirmwareRun, MovesAsFarWhereMotorsChangeWithinATick) {
   }
 }
 
+/// kilo_ticks has four octets, and the robot's processor reads them one by one. If the clock's interrupt comes in between while the
+/// lowest carries over, the program sees a time up to 255 ticks ahead.
 TEST_F(FirmwareRun, DiffersFirstWhereTheClockCarriesOver) {
   const std::string walk = "behaviour: \"" KILOTWIN_SOURCE_DIR "/behaviours/walk.c\" ";
   int early = 0;
