@@ -130,6 +130,11 @@ TEST_F(FirmwareRun, MovesAsFarWhereMotorsChangeWithinATick) {
       {"spinup_motors(); set_motors(kilo_straight_left, kilo_straight_right); delay(40);",
        (15 * kSpinUp + 40) / 55.0},
       {"spinup_motors(); set_motors(0, 0); delay(5);", 15 * kSpinUp / 20},
+      // Each call leaves the memory as it was; it counts nevertheless.
+      {"set_motors(kilo_straight_left, kilo_straight_right); for (volatile uint16_t n = 0; n < 3000; ++n); "
+       "set_motors(0, 0);",
+       1},
+      {"OCR2A = kilo_straight_left; OCR2B = kilo_straight_right; delay(10); OCR2A = OCR2B = 0; delay(10);", 0.5},
   };
   for (const Pulses& one : all) {
     const std::string source = program(
