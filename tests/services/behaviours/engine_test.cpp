@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "core/base/error.hpp"
+#include "idl/manifest.pb.h"
 #include "tests/services/behaviours/swarm.hpp"
 
 namespace kilotwin::behaviours::test {
@@ -243,6 +244,25 @@ TEST(Engine, HostsOnThreadsEqualOneHost) {
     ++two.tick;
     ASSERT_TRUE(equal(one.frame(), two.frame())) << "tick " << k;
     ASSERT_EQ(one.hash(), two.hash());
+  }
+}
+
+/// Ticks end anywhere in these calls. What the host knows of a tick's duties is not part of a robot's memory.
+TEST(Engine, ManyChangesOfMotorsInATickDoNotDependOnTheHosts) {
+  const std::string source = program(
+      "static void loop(void) { set_motors(70 + (rand_soft() & 1), kilo_uid);\n"
+      "  set_motors(kilo_uid & 7, 70); }");
+  const auto as_on_robot = [](proto::Manifest& manifest) {
+    manifest.mutable_experiment()->mutable_robots(0)->set_loop_rate(proto::RobotGroup::AS_ON_ROBOT);
+  };
+  Swarm one({source}, 60, 1, "", as_on_robot), several({source}, 60, 12, "", as_on_robot);
+  one.start();
+  several.start();
+  for (int k = 0; k < 300; ++k) {
+    one.step();
+    several.step();
+    ASSERT_TRUE(equal(one.frame(), several.frame())) << "tick " << k;
+    ASSERT_EQ(one.hash(), several.hash()) << "tick " << k;
   }
 }
 
