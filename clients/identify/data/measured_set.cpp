@@ -28,11 +28,6 @@ std::optional<fs::path> find_csv(const fs::path& directory, const char* stem) {
   return std::nullopt;
 }
 
-/// Names of runs enter the result, which is UTF-8.
-void demand_utf8(std::string_view run) {
-  if (!is_utf8(run)) throw UserError("the name of a run is not UTF-8; save the tables as UTF-8");
-}
-
 /// The tracks of a set while its files are read.
 class Builder {
  public:
@@ -44,7 +39,6 @@ class Builder {
     auto known = runs_.find(run);
     if (known == runs_.end()) {
       if (!make) return nullptr;
-      demand_utf8(run);
       known = runs_.emplace(std::string(run), runs_.size()).first;
       set_.runs.push_back({std::string(run), {}});
       tracks_.emplace_back();
@@ -112,6 +106,8 @@ void read_trajectories(const fs::path& file, MeasuredSet& set, Builder& builder)
   while (csv.next()) {
     const Sample sample{csv.number(time), csv.number(x), csv.number(y),
                         heading ? csv.number_or_nan(*heading) : std::nan("")};
+    if (!is_utf8(csv.text(run)))
+      csv.complain(run, "run is not UTF-8; save the table as UTF-8");  // it enters the result
     builder.track(csv.text(run), csv.whole(robot), true)->samples.push_back(sample);
     set.has_headings = set.has_headings || !std::isnan(sample.heading_rad);
   }
