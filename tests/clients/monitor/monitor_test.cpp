@@ -96,7 +96,8 @@ TEST(Monitor, AnAlarmUnderTheModelIsRarerThanStated) {
   EXPECT_LE(static_cast<double>(alarms.size()), 300 * minutes / 60);
 }
 
-TEST(Monitor, AMotorThatFailsIsNamed) {
+/// Ten robots; the left motor of robot 3 fails at 90 s.
+ArenaOptions with_a_failing_motor() {
   ArenaOptions options;
   options.robots = 10;
   options.side_mm = 1500;
@@ -105,7 +106,11 @@ TEST(Monitor, AMotorThatFailsIsNamed) {
       "effect { name: \"failed\" acts_on: WHEEL_GAIN wheel: LEFT_WHEEL robot: 3 function { of: TIME steps { at: "
       "90 "
       "value: 0 value: -1 } } }";
-  VirtualArena arena(options, {});
+  return options;
+}
+
+TEST(Monitor, AMotorThatFailsIsNamed) {
+  VirtualArena arena(with_a_failing_motor(), {});
   const std::vector<Alarm> alarms = play(arena, 130);
   ASSERT_FALSE(alarms.empty());
   EXPECT_EQ(alarms[0].robots, std::vector<std::uint32_t>{3}) << lines(alarms);
@@ -135,16 +140,9 @@ TEST(Monitor, AMotorThatFailsIsNamed) {
 
 /// Robots without shadows: the station's packets tell what they were commanded.
 TEST(Monitor, AMotorThatFailsIsNamedByWhatTheStationSent) {
-  ArenaOptions options;
-  options.robots = 10;
-  options.side_mm = 1500;
-  options.model = noisy(0.001);
-  options.faults =
-      "effect { name: \"failed\" acts_on: WHEEL_GAIN wheel: LEFT_WHEEL robot: 3 function { of: TIME steps { at: 90 "
-      "value: 0 value: -1 } } }";
   MonitorSettings settings;
   settings.station_commands = station_commands_of("3=stop,4=straight,1=left,2=right");
-  VirtualArena arena(options, settings);
+  VirtualArena arena(with_a_failing_motor(), settings);
   const std::vector<Alarm> alarms = play(arena, 130);
   ASSERT_FALSE(alarms.empty());
   EXPECT_EQ(alarms[0].robots, std::vector<std::uint32_t>{3}) << lines(alarms);
