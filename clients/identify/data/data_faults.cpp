@@ -9,7 +9,7 @@
 #include <map>
 
 #include "clients/identify/data/command_response.hpp"
-#include "core/math/median.hpp"
+#include "core/stats/quantiles.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -76,8 +76,8 @@ void exclude_duplicates(MeasuredSet& set, std::vector<DataFault>& faults) {
         Track& copy = run.tracks[first ? a : b];
         const Track& origin = run.tracks[first ? b : a];
         faults.push_back({DataFault::Kind::kDuplicate, run.name, copy.robot, origin.robot,
-                          copy.samples.front().time_s, copy.samples.back().time_s, upper_median(common.distance_mm),
-                          copy.samples.size()});
+                          copy.samples.front().time_s, copy.samples.back().time_s,
+                          stats::upper_median(common.distance_mm), copy.samples.size()});
         copy.samples.clear();
       }
     }
@@ -221,7 +221,8 @@ void exclude_outliers(MeasuredSet& set, std::vector<DataFault>& faults) {
     // The length of a two-dimensional normal vector has a median of 1.18 standard deviations.
     const auto fast = speeds.begin() + static_cast<std::ptrdiff_t>(speeds.size() * 19 / 20);
     std::nth_element(speeds.begin(), fast, speeds.end());
-    const Bounds bounds{std::max(kOutlierSds * upper_median(course) / 1.18, kLeastOutlier_mm), kTooFast * *fast};
+    const Bounds bounds{std::max(kOutlierSds * stats::upper_median(course) / 1.18, kLeastOutlier_mm),
+                        kTooFast * *fast};
     DataFault fault{DataFault::Kind::kOutliers,
                     run.name,
                     std::nullopt,

@@ -8,7 +8,7 @@
 
 #include "clients/identify/data/command_clock.hpp"
 #include "core/base/error.hpp"
-#include "core/math/median.hpp"
+#include "core/stats/quantiles.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -60,7 +60,7 @@ void demand_seconds(const MeasuredSet& set, const std::string& from) {
     }
   }
   if (steps.size() < 5) return;
-  const double step = upper_median(steps);
+  const double step = stats::upper_median(steps);
   if (step > kSlowestSampling_s)
     throw UserError(fmt::format(
         "{}: the sampling interval is {:g} s; give time_s in seconds (not milliseconds or frames), about one "
@@ -157,7 +157,7 @@ void demand_motion(const MeasuredSet& set, const std::string& from) {
         "or omit it if robots always drive straight",
         from));
   if (speeds.size() < 5) return;
-  const double speed = upper_median(speeds);
+  const double speed = stats::upper_median(speeds);
   if (speed > kFastestMedian_mm_s)
     throw UserError(fmt::format(
         "{}: robots drive at {:.3g} mm/s, Kilobots at about 10 mm/s; give x_mm and y_mm in mm (not pixels), "
