@@ -21,15 +21,17 @@ class Observations;
 namespace comm {
 
 struct RadioCounter {
-  std::string_view name;  ///< of the recorded variable
+  std::string_view name;    ///< of the recorded variable
+  std::string_view counts;  ///< in words, for the reference
   std::uint32_t RadioCount::*count;
 };
 
-inline constexpr std::array<RadioCounter, 5> kRadioCounters{{{"radio_attempted", &RadioCount::attempted},
-                                                             {"radio_sent", &RadioCount::sent},
-                                                             {"radio_received", &RadioCount::received},
-                                                             {"radio_collided", &RadioCount::collided},
-                                                             {"radio_backed_off", &RadioCount::backed_off}}};
+inline constexpr std::array<RadioCounter, 5> kRadioCounters{
+    {{"radio_attempted", "start pulses", &RadioCount::attempted},
+     {"radio_sent", "whole packets sent", &RadioCount::sent},
+     {"radio_received", "packets received of other robots", &RadioCount::received},
+     {"radio_collided", "receptions lost because packets overlapped", &RadioCount::collided},
+     {"radio_backed_off", "attempts given up because another robot was sending", &RadioCount::backed_off}}};
 
 /// nullptr: no counter has this name.
 [[nodiscard]] const RadioCounter* radio_counter(std::string_view name);

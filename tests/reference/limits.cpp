@@ -11,6 +11,7 @@
 #include "core/experiment/limits.hpp"
 #include "core/logs/robot_logs.hpp"
 #include "services/behaviours/image.hpp"
+#include "services/comm/radio_counters.hpp"
 
 namespace kilotwin::reference {
 namespace {
@@ -60,6 +61,13 @@ std::string limits_table() {
   row("record of a recording", fmt::format("{} MiB", recorder::kLongestRecord_bytes >> 20),
       "clients/recorder/recording.hpp");
   row("runs of a sweep", number(cli::kMostSweepRuns), "clients/cli/sweep_points.hpp");
+  return table;
+}
+
+std::string counters_table() {
+  std::string table = "| name | counts, per robot, since the start of the run |\n|---|---|\n";
+  for (const comm::RadioCounter& counter : comm::kRadioCounters)
+    table += fmt::format("| `{}` | {} |\n", counter.name, counter.counts);
   return table;
 }
 

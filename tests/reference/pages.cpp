@@ -25,6 +25,7 @@ Regions regions(const std::filesystem::path& sources, const std::filesystem::pat
           {"model", [] { return model_schema(KILOTWIN_SCHEMA); }},
           {"topics", [sources] { return "```idl\n" + read_text(sources / "idl" / "public.idl") + "```\n"; }},
           {"limits", [] { return limits_table(); }},
+          {"counters", [] { return counters_table(); }},
           {"commands", [program] { return commands_help(program); }}};
 }
 
