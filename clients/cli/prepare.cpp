@@ -10,6 +10,7 @@
 #include <random>
 #include <set>
 
+#include "clients/cli/page_recording.hpp"
 #include "clients/cli/recorded_variables.hpp"
 #include "clients/recorder/provenance.hpp"
 #include "core/base/build_identity.hpp"
@@ -323,6 +324,8 @@ Resolved resolve(const LoadedExperiment& loaded, const RunArguments& arguments, 
   if (arguments.max_lateness_ms > 0) manifest.set_max_lateness_ms(arguments.max_lateness_ms);
   manifest.set_resumed(!arguments.resume.empty());
   resolved.objects = build_programs(loaded, arguments, manifest, notes);
+  if (arguments.record_for_page && placed.x_mm.size() <= kMostRobotsForPage)
+    record_for_page(contents_of(resolved.objects), *manifest.mutable_experiment()->mutable_recording());
   add_recorded_variables(loaded, resolved.objects, manifest);
   check_observables(loaded, manifest);
   resolved.plugins = build_plugins(loaded, arguments, manifest);

@@ -89,12 +89,17 @@ std::string names_in_words(const std::vector<std::string>& elves) {
 
 }  // namespace
 
-void add_recorded_variables(const LoadedExperiment& loaded, const std::vector<std::filesystem::path>& objects,
-                            proto::Manifest& manifest) {
-  const proto::Recording& recording = loaded.experiment.recording();
-  if (recording.variable_size() == 0) return;
+std::vector<std::string> contents_of(const std::vector<std::filesystem::path>& objects) {
   std::vector<std::string> elves;
   for (const std::filesystem::path& object : objects) elves.push_back(os::read_file(object));
+  return elves;
+}
+
+void add_recorded_variables(const LoadedExperiment& loaded, const std::vector<std::filesystem::path>& objects,
+                            proto::Manifest& manifest) {
+  const proto::Recording& recording = manifest.experiment().recording();
+  if (recording.variable_size() == 0) return;
+  const std::vector<std::string> elves = contents_of(objects);
   for (int v = 0; v < recording.variable_size(); ++v) {
     const proto::RecordedVariable& wanted = recording.variable(v);
     const std::string place = fmt::format("recording.variable[{}].name", v);

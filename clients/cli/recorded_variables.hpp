@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "core/experiment/load.hpp"
@@ -9,7 +10,10 @@
 
 namespace kilotwin::cli {
 
-/// Finds the experiment's recording.variable in the debug information of its programs, and adds them to the manifest. `objects`:
+/// The octets of the compiled programs. Throws std::runtime_error where one cannot be read.
+[[nodiscard]] std::vector<std::string> contents_of(const std::vector<std::filesystem::path>& objects);
+
+/// Finds recording.variable of the manifest's experiment in the debug information of its programs, and adds them to the manifest. `objects`:
 /// the compiled programs, in the manifest's order. Throws UserError with the place where no program has a variable of that name, or
 /// its path does not fit.
 void add_recorded_variables(const LoadedExperiment& loaded, const std::vector<std::filesystem::path>& objects,

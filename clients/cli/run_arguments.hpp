@@ -34,6 +34,7 @@ struct RunArguments {
   bool realtime = false;       ///< services take precedence over other programs of the machine
   std::optional<double> checkpoint_every_s;
   std::filesystem::path resume;  ///< a run, or one of its checkpoints; empty: from tick 0
+  bool record_for_page = false;  ///< also what the page of a run shows
   bool prepare = false;          ///< write the run directory and stop
   std::optional<std::uint32_t> domain;
   double give_up_after_s = 0;  ///< longest wait of services for each other without progress; 0: no limit

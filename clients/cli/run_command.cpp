@@ -117,7 +117,8 @@ struct RunOptions : RunArguments {
   bool view = false;  ///< with a web page
 };
 
-int run(const RunOptions& arguments, double started_s) {
+int run(RunOptions arguments, double started_s) {
+  arguments.record_for_page = arguments.view;
   if (arguments.mode == "local") warn_beyond_cores("--threads", arguments.threads);
   if (arguments.mode == "local" && arguments.domain)
     throw UserError("--domain: a local run uses no DDS domain; leave the option out, or give --mode federated");
@@ -223,8 +224,10 @@ Command add_run(CLI::App& program, double started_s) {
   add_output_options(app, arguments->output, "runs/NAME-SEED, with a number added if it exists");
   app.add_flag("--strict", arguments->strict, "end with status 1 where a robot's program has failed");
   app.add_flag("--quiet", arguments->quiet, "no progress and no summary on the screen");
-  app.add_flag("--view", arguments->view,
-               "a web page of the run, live and then recorded, until Ctrl-C; its address is printed");
+  app.add_flag(
+      "--view", arguments->view,
+      "a web page of the run, live and then recorded, until Ctrl-C; its address is printed; up to 1000 robots, "
+      "messages, counters of the radio and variables are recorded for it");
   return {&app, [arguments, started_s] { return run(*arguments, started_s); }};
 }
 

@@ -340,16 +340,24 @@ void add_tracking(Data& page, const Summary& s) {
 void add_federates(Data& page, const Summary& s) {
   if (s.federates.empty()) return;
   html::Table table({"federate", "computes", "publishes", "waits", "share of waiting"});
+  const auto waiting = [](const FederateTime& one) {
+    const double all_s = one.step_s + one.exchange_s + one.wait_s;
+    return all_s > 0 ? one.wait_s / all_s : 0;
+  };
   const FederateTime* busiest = s.federates.data();
   for (const FederateTime& one : s.federates) {
-    if (one.wait_s < busiest->wait_s) busiest = &one;
-    const double all_s = one.step_s + one.exchange_s + one.wait_s;
+    if (waiting(one) < waiting(*busiest)) busiest = &one;
     table.row({html::escaped(one.name), seconds(one.step_s), seconds(one.exchange_s), seconds(one.wait_s),
-               fmt::format("{:.0f} %", all_s > 0 ? 100 * one.wait_s / all_s : 0)});
+               fmt::format("{:.0f} %", 100 * waiting(one))});
   }
+  // The rule of the page, clients/view/page/work.ts.
+  const bool held_up = s.federates.size() > 1 && waiting(*busiest) < 0.5;
+  const std::string verdict = held_up ? fmt::format("{} held up the others: it waited for {:.0f} % of its time.",
+                                                    busiest->name, 100 * waiting(*busiest))
+                                      : "Nobody held up the run: all federates waited most of their time.";
   Data federates{Data::type::object};
-  federates.set("lead", fmt::format("Wall time per federate. {} waited least: the others waited for it{}.",
-                                    busiest->name, s.paced ? ", and for the pace" : ""));
+  federates.set("lead", fmt::format("Wall time per federate. {}{}", verdict,
+                                    s.paced ? " They waited for the pace too." : ""));
   federates.set("table", table.text());
   page.set("federates", federates);
 }

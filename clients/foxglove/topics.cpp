@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <numeric>
 #include <set>
 #include <utility>
 
@@ -33,7 +34,7 @@ void add_file(const google::protobuf::FileDescriptor& file, std::set<std::string
   file.CopyTo(files.add_file());
 }
 
-template <class Message> std::uint16_t add_channel(Sink& sink, const char* topic, std::size_t matter = 1) {
+template <class Message> std::uint16_t add_channel(Sink& sink, std::string_view topic, std::size_t matter = 1) {
   const google::protobuf::Descriptor& descriptor = *Message::descriptor();
   std::set<std::string> known;
   google::protobuf::FileDescriptorSet files;
@@ -244,12 +245,26 @@ void Topics::write_counters(const State& state) {
   write(counters_, state.time, counters);
 }
 
-void Topics::log(Time_ns time, Level level, const std::string& text) {
+void Topics::variable(Time_ns time, const std::string& name, std::span<const std::uint32_t> robot,
+                      std::span<const double> value) {
+  auto channel = variables_.find(name);
+  if (channel == variables_.end())
+    channel = variables_.emplace(name, add_channel<mcap::RobotVariable>(sink_, "/variables/" + name)).first;
+  mcap::RobotVariable message;
+  set(message.mutable_timestamp(), time);
+  message.mutable_robot()->Add(robot.begin(), robot.end());
+  message.mutable_value()->Add(value.begin(), value.end());
+  if (!value.empty())
+    message.set_mean(std::accumulate(value.begin(), value.end(), 0.0) / static_cast<double>(value.size()));
+  write(channel->second, time, message);
+}
+
+void Topics::log(Time_ns time, Level level, const std::string& text, std::string_view speaker) {
   pb::Log log;
   set(log.mutable_timestamp(), time);
   log.set_level(level == Level::kError ? pb::Log::ERROR : pb::Log::INFO);
   log.set_message(text);
-  log.set_name("kilotwin");
+  log.set_name(std::string{speaker});
   write(log_, time, log);
 }
 

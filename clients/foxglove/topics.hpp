@@ -4,10 +4,13 @@
 ///   /robots     foxglove.PointCloud: all robots, in the colours of their LEDs
 ///   /poses      foxglove.PosesInFrame: all robots, with headings
 ///   /counters   kilotwin.mcap.SwarmCounters: numbers for plots
-///   /log        foxglove.Log: inputs of the run, and its end
+///   /variables/NAME  kilotwin.mcap.RobotVariable: a recorded variable, one value per robot
+///   /log        foxglove.Log: inputs of the run, lines that robots print, and the end of the run
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -52,7 +55,11 @@ class Topics {
 
   /// The first state writes the arena too. The mean square displacement is that from the first state.
   void state(const State& state);
-  void log(Time_ns time, Level level, const std::string& text);
+  /// `speaker`: who says it, such as "robot 17".
+  void log(Time_ns time, Level level, const std::string& text, std::string_view speaker = "kilotwin");
+  /// A variable's values at one instant; `robot` and `value` have equal lengths. The first of a name adds its channel.
+  void variable(Time_ns time, const std::string& name, std::span<const std::uint32_t> robot,
+                std::span<const double> value);
 
  private:
   void write(std::uint16_t channel, Time_ns time, const google::protobuf::Message& message);
@@ -64,6 +71,7 @@ class Topics {
   Sink& sink_;
   const World world_;
   const std::uint16_t scene_, robots_, poses_, counters_, log_;
+  std::map<std::string, std::uint16_t, std::less<>> variables_;  // channels by name
   std::vector<double> first_x_mm_, first_y_mm_;
   bool any_ = false;
   std::string bytes_;  // reused

@@ -2,12 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <string>
 
 #include "clients/foxglove/topics.hpp"
 #include "clients/mcap/mcap_writer.hpp"
+#include "clients/mcap/printed_lines.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::mcap {
@@ -55,10 +58,15 @@ std::span<const double> numbers(const google::protobuf::RepeatedField<double>& f
 class Exporter {
  public:
   Exporter(const recorder::Reader& recording, const std::filesystem::path& file)
-      : length_(recording.tick_length()), sink_(file), topics_(sink_, world_of(recording.header())) {}
+      : length_(recording.tick_length()),
+        variables_(recording.header().variable().begin(), recording.header().variable().end()),
+        printed_(recording.path().parent_path(), recording.header().robots()),
+        sink_(file),
+        topics_(sink_, world_of(recording.header())) {}
 
   void state(const proto::StateRecord& record) {
     ++states_;
+    printed_before(length_.seconds_at(Tick{record.tick()}));
     foxglove::State state;
     state.time = time_of(record.tick());
     state.x_mm = numbers(record.x_mm());
@@ -70,6 +78,15 @@ class Exporter {
     state.movable_y_mm = numbers(record.movable_y_mm());
     state.movable_heading_rad = numbers(record.movable_heading_rad());
     topics_.state(state);
+  }
+
+  void variable(const proto::VariableRecord& record) {
+    const proto::VariableColumn& column = variables_.at(record.variable());
+    const std::vector<double> value = column.integer()
+                                          ? std::vector<double>(record.integer().begin(), record.integer().end())
+                                          : std::vector<double>(record.number().begin(), record.number().end());
+    topics_.variable(time_of(record.tick()), column.name(),
+                     {record.robot().data(), static_cast<std::size_t>(record.robot_size())}, value);
   }
 
   void input(const proto::InputRecord& input) {
@@ -84,6 +101,7 @@ class Exporter {
   }
 
   std::uint64_t close() {
+    printed_before(std::numeric_limits<double>::infinity());
     sink_.close();
     return states_;
   }
@@ -93,7 +111,15 @@ class Exporter {
     return static_cast<Time_ns>(std::llround(length_.seconds_at(Tick{tick}) * 1e9));
   }
 
+  void printed_before(double end_s) {
+    while (const PrintedLines::Line* const line = printed_.next_before(end_s))
+      topics_.log(static_cast<Time_ns>(std::llround(std::max(0.0, line->time_s) * 1e9)),
+                  foxglove::Topics::Level::kInfo, line->text, fmt::format("robot {}", line->robot));
+  }
+
   const TickLength length_;
+  const std::vector<proto::VariableColumn> variables_;
+  PrintedLines printed_;
   FileSink sink_;
   foxglove::Topics topics_;
   std::uint64_t states_ = 0;
@@ -111,6 +137,7 @@ std::uint64_t export_mcap(recorder::Reader& recording, const std::filesystem::pa
       exporter.state(record->state());
       due = schedule.at_or_after(Tick{record->state().tick()} + 1);
     }
+    if (record->has_variable()) exporter.variable(record->variable());
     if (record->has_input()) exporter.input(record->input());
     if (record->has_end()) exporter.end(record->end());
   }

@@ -13,6 +13,7 @@
 #include <string_view>
 #include <vector>
 
+#include "clients/http/request_allowance.hpp"
 #include "clients/http/server.hpp"
 #include "clients/view/run_text.hpp"
 #include "core/base/error.hpp"
@@ -66,17 +67,8 @@ struct Viewer {
   std::deque<std::string> lines;
   Message answered_frame;  // nullptr: none
   std::string incoming;
-  double allowance = kMostRequestsPerSecond;  // requests that it may send now
-  Clock::time_point counted = Clock::now();
+  http::RequestAllowance allowance;
 
-  /// Counts a request; false where there were too many.
-  bool allowed() {
-    const auto now = Clock::now();
-    allowance += kMostRequestsPerSecond * std::chrono::duration<double>(now - counted).count();
-    allowance = std::min(allowance, kMostRequestsPerSecond) - 1;
-    counted = now;
-    return allowance >= 0;
-  }
   /// A question replaces an earlier one of its kind; curves wait beside each other.
   void ask(const Request& request) {
     if (request.kind != Request::Kind::kPlot)
@@ -279,7 +271,8 @@ class Gateway::Service {
     if (viewer.incoming.size() + part.size() > kLongestRequest_bytes)
       return disconnect(connection, LWS_CLOSE_STATUS_MESSAGE_TOO_LARGE, "the request is too long");
     if (!http::is_whole(connection, viewer.incoming, part)) return 0;
-    if (!viewer.allowed()) return disconnect(connection, LWS_CLOSE_STATUS_POLICY_VIOLATION, "too many requests");
+    if (!viewer.allowance.take(Clock::now()))
+      return disconnect(connection, LWS_CLOSE_STATUS_POLICY_VIOLATION, "too many requests");
     const std::optional<Request> request = parse_request(viewer.incoming);
     viewer.incoming.clear();
     if (!request) return disconnect(connection, LWS_CLOSE_STATUS_INVALID_PAYLOAD, "that is no request");
@@ -289,7 +282,7 @@ class Gateway::Service {
   }
 
   void take(Viewer& viewer, const Request& request) {
-    // Who comes again after a while has saved up nothing.
+    // A viewer that comes again after a while has saved up nothing.
     if (!viewer.waits()) viewer.served_s = std::max(viewer.served_s, serving_s_);
     switch (request.kind) {
       case Request::Kind::kHello:

@@ -3,7 +3,7 @@
 /// A viewer gets text messages, JSON objects with a `type`, and binary frames (frame_code.hpp); it sends requests (request.hpp).
 /// A viewer gets one frame per request, so a slow one gets fewer frames, and one that stalls gets none. Requests that it has not
 /// been answered replace each other. A viewer that breaks the rules is disconnected: a message that is too long or no request,
-/// or more than kMostRequestsPerSecond. No viewer delays post_frame().
+/// or more than http::kMostRequestsPerSecond. No viewer delays post_frame().
 ///
 /// One thread answers. Next is the viewer whose answers have taken least time, so one that asks expensive questions waits for the
 /// others, and they wait for one of its answers at most.
@@ -26,7 +26,6 @@ namespace kilotwin::view {
 
 inline constexpr const char* kSubprotocol = "kilotwin-view.1";
 inline constexpr std::uint32_t kMostViewers = 64;
-inline constexpr double kMostRequestsPerSecond = 500;
 
 /// Answers what viewers ask. The gateway calls it from its own thread, one call at a time.
 class Answers {

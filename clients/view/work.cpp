@@ -34,11 +34,16 @@ std::string work_text(const recorder::Summary& summary) {
                                                                 {"station", c.station},
                                                                 {"exchange", c.exchange},
                                                                 {"recording", c.recording}}};
-  if (summary.federates.empty()) {
-    for (const auto& [name, ns] : subjects)
-      if (ns > 0) cost.push_back({{"name", name}, {"ns", ns}});
-  }
-  return json{{"type", "work"}, {"live", false}, {"federates", federates_of(summary.federates)}, {"cost", cost}}
+  for (const auto& [name, ns] : subjects)
+    if (ns > 0) cost.push_back({{"name", name}, {"ns", ns}});
+  return json{{"type", "work"},
+              {"live", false},
+              {"federates", federates_of(summary.federates)},
+              {"cost", cost},
+              {"sent", summary.messages.sent},
+              {"received", summary.messages.received},
+              {"simulatedSeconds", summary.simulated_s},
+              {"meanSpeed", summary.realtime_factor()}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
 }
 

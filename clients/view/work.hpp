@@ -21,7 +21,7 @@ namespace view {
 
 /// A message of type "work". `live`: of the last seconds, else of the whole run.
 [[nodiscard]] std::string work_text(bool live, const std::vector<FederateTime>& federates);
-/// The same of a run that has ended; of a run in one process, its cost by subject.
+/// The same of a run that has ended, with its cost by subject, ns per robot and tick, its messages and its mean speed.
 [[nodiscard]] std::string work_text(const recorder::Summary& summary);
 
 /// The last seconds of a live run, from the metrics of its federates.

@@ -23,8 +23,8 @@ using Regions = std::map<std::string, std::function<std::string()>>;
 [[nodiscard]] std::string regenerated(const std::string& page, const Regions& regions);
 
 /// Pages with generated regions, of docs/reference.
-inline constexpr const char* kPages[] = {"experiment.md", "model.md", "topics.md", "limits.md",
-                                         "observables.md", "commands.md"};
+inline constexpr const char* kPages[] = {"experiment.md", "model.md",       "topics.md",
+                                         "limits.md",     "observables.md", "commands.md"};
 
 /// The text of a file. Throws std::runtime_error where it cannot be read.
 [[nodiscard]] std::string read_text(const std::filesystem::path&);

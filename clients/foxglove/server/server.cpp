@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "clients/http/request_allowance.hpp"
 #include "clients/http/server.hpp"
 #include "core/base/base64.hpp"
 #include "core/base/error.hpp"
@@ -57,6 +58,7 @@ struct Viewer {
   std::map<std::uint32_t, Subscription> subscriptions;  ///< by the viewer's numbers
   std::uint32_t last_served = 0;                        ///< subscriptions take turns
   std::string incoming;
+  http::RequestAllowance allowance;
 };
 
 /// What libwebsockets keeps per connection, as zeroed memory.
@@ -185,6 +187,8 @@ class Server::Service {
       return http::closed(connection, LWS_CLOSE_STATUS_MESSAGE_TOO_LARGE, "the request is too long");
     if (!http::is_whole(connection, viewer.incoming, part)) return 0;
     const std::string text = std::exchange(viewer.incoming, {});
+    if (!viewer.allowance.take(http::RequestAllowance::Clock::now()))
+      return http::closed(connection, LWS_CLOSE_STATUS_POLICY_VIOLATION, "too many requests");
     if (lws_frame_is_binary(connection) != 0) return 0;  // what viewers publish is of no interest
     const json request = json::parse(text, nullptr, false);
     if (!request.is_object())

@@ -3,7 +3,7 @@
 ///
 /// Viewers can only look. A slow one gets fewer messages: of each channel the newest that matter. What waits for it is bounded, and
 /// no viewer delays write() or another viewer. One that breaks the rules is disconnected: a message that is too long or no JSON,
-/// or too many subscriptions.
+/// too many subscriptions, or more than http::kMostRequestsPerSecond.
 ///
 /// Browsers let pages of any origin open a WebSocket. The server therefore refuses connections whose `Host` is not its own.
 /// It serves the pages of Foxglove, of Lichtblick, of this machine, and of the origins that it was given, and no others. A sandboxed page has

@@ -435,7 +435,7 @@ class Page {
     const frame = this.#playback.current;
     if (!run) return;
     this.#bytes = this.#bytes.filter((entry) => now - entry.at < 2000);
-    showRun(run, this.#status, this.#bytes.reduce((sum, entry) => sum + entry.bytes, 0) / 2, this.#handOvers.count);
+    showRun(run, this.#status, this.#work, this.#bytes.reduce((sum, entry) => sum + entry.bytes, 0) / 2, this.#handOvers.count);
     if (!frame) return;
     const time = this.#playback.playing ? this.#playback.time : frame.tick;
     this.#pace.push({ at: now, tick: time });

@@ -3,7 +3,7 @@ import { GRID_PX, roundStep } from "./geometry.ts";
 import { cellOf, isGhost } from "./partitions.ts";
 import {
   groupOf, headingOf, ledOf, leftMotorOn, lifeName, lifeOf, rightMotorOn, LIFE_FAILED,
-  type Frame, type ProgramText, type RobotCounts, type Run, type Status,
+  type Frame, type ProgramText, type RobotCounts, type Run, type Status, type WorkText,
 } from "./protocol.ts";
 
 export function element<Kind extends HTMLElement>(id: string): Kind {
@@ -40,8 +40,9 @@ const fileName = (path: string): string => path.split("/").pop() ?? "";
 const list = (entries: { robot: number; count: number }[]): string =>
   entries.length === 0 ? "none" : entries.map((entry) => `${entry.robot} (${entry.count})`).join(", ");
 
-export function showRun(run: Run, status: Status | undefined, bytesPerSecond: number, handOvers: number): void {
+export function showRun(run: Run, status: Status | undefined, work: WorkText | undefined, bytesPerSecond: number, handOvers: number): void {
   setText("name", run.name);
+  setText("speed-what", run.source === "recorded" ? "playback" : "speed");
   document.title = `${run.name} – Kilotwin`;
   const { radius, corners, halfWidth, halfHeight } = run.arena;
   const size = `${(2 * halfWidth).toFixed(0)} × ${(2 * halfHeight).toFixed(0)} mm`;
@@ -59,6 +60,9 @@ export function showRun(run: Run, status: Status | undefined, bytesPerSecond: nu
     facts.push(["messages sent", String(status.sent)], ["received", String(status.received)]);
     if (status.wallSeconds > 0) facts.push(["mean speed", `${(status.simulatedSeconds / status.wallSeconds).toFixed(2)}×`]);
     if (status.note) facts.push(["note", status.note]);
+  } else if (work?.sent !== undefined) {
+    facts.push(["messages sent", String(work.sent)], ["received", String(work.received)]);
+    if (work.meanSpeed) facts.push(["mean speed", `${work.meanSpeed.toFixed(2)}×`]);
   }
   facts.push(["data", `${(bytesPerSecond / 1000).toFixed(0)} kB/s`]);
   for (const group of run.groups) {

@@ -179,8 +179,12 @@ export interface WorkText {
   /** Of the last seconds; else of the whole run. */
   live: boolean;
   federates: FederateWork[];
-  /** Of a run in one process: CPU time by subject, ns per robot and tick. */
+  /** Of a run that has ended: CPU time by subject, ns per robot and tick. */
   cost: { name: string; ns: number }[];
+  /** Of a run that has ended: messages of all robots, and simulated time over wall time. */
+  sent?: number;
+  received?: number;
+  meanSpeed?: number;
 }
 
 export interface MarksText {

@@ -55,5 +55,7 @@ export function showWork(work: WorkText | undefined): void {
          : work.live ? "Nobody holds up the run: all federates wait most of their time."
                      : "Nobody held up the run: all federates waited most of their time.";
   setText("work-verdict", verdict);
+  const costOfAll = cost.map(({ name, ns }) => `${name} ${ns.toFixed(0)}`).join(", ");
+  setText("work-cost", federates.length > 0 && sum > 0 ? `CPU time per robot and tick: ${sum.toFixed(0)} ns (${costOfAll}).` : "");
   setText("work-span", federates.length === 0 ? "whole run" : work.live ? "last seconds" : "whole run");
 }

@@ -1,14 +1,15 @@
-// Curves of report.html where the recording is long.
+// Curves of report.html where the recording is long; who held up whom.
 #include "clients/cli/run_report.hpp"
 
 #include <gtest/gtest.h>
 
+#include "clients/recorder/summary.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::cli {
 namespace {
 
-TEST(RunReport, DrawsSomeStatesOfALongRecordingAndSaysSo) {
+TEST(RunReport, SaysWhatIsDrawnOfALongRecordingAndWhoHeldUpWhom) {
   const test::Scratch scratch;
   test::write(
       scratch / "e.txtpb",
@@ -28,6 +29,18 @@ TEST(RunReport, DrawsSomeStatesOfALongRecordingAndSaysSo) {
   const std::string all = test::read(directory.report());
   EXPECT_EQ(all.find("one state in"), std::string::npos);
   EXPECT_NE(all, some);
+
+  // Who held up whom: the federate that waited least, unless all waited most of their time.
+  recorder::Summary summary = recorder::read_summary(directory.summary());
+  summary.federates = {{"physics 1,1", 1, 0, 9}, {"radio", 8, 1, 1}};
+  recorder::write_summary(summary, directory.summary());
+  write_run_report(directory);
+  EXPECT_NE(test::read(directory.report()).find("radio held up the others: it waited for 10 % of its time."),
+            std::string::npos);
+  summary.federates = {{"physics 1,1", 1, 0, 9}, {"radio", 2, 1, 7}};
+  recorder::write_summary(summary, directory.summary());
+  write_run_report(directory);
+  EXPECT_NE(test::read(directory.report()).find("Nobody held up the run"), std::string::npos);
 }
 
 }  // namespace

@@ -133,6 +133,22 @@ try {
     bad.send(text);
     await closed;
   }
+  // A viewer that sends without end is disconnected; one that never reads delays nobody.
+  const flood = new WebSocket(url, ["foxglove.sdk.v1"]);
+  await new Promise((open) => flood.on("open", open));
+  flood.on("error", () => {});
+  const code = new Promise((done) => flood.on("close", done));
+  for (let i = 0; i < 20000; i += 1) flood.send('{"op": "unsubscribe", "subscriptionIds": []}');
+  assert.ok([1006, 1008].includes(await code), "with a reason, or at once where more was on its way");
+  const deaf = new WebSocket(url, ["foxglove.sdk.v1"]);
+  await new Promise((open) => deaf.on("open", open));
+  deaf.on("error", () => {});
+  deaf.send(JSON.stringify({ op: "subscribe", subscriptions: [...Array(100).keys()].map((id) => ({ id, channelId: id })) }));
+  deaf.pause();
+  const seenBefore = late.messages["/robots"].length;
+  await late.until("states beside a viewer that never reads", () => late.messages["/robots"].length >= seenBefore + 10);
+  deaf.terminate();
+
   // Host names of other machines are refused, and pages that are not of a viewer, of this machine, or of --origin.
   const admitted = (headers) =>
     new Promise((done) => {

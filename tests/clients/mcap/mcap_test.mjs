@@ -118,6 +118,47 @@ try {
   let messages = 0;
   for (let record = stream.nextRecord(); record; record = stream.nextRecord()) if (record.type === "Message") ++messages;
   assert.ok(messages > STATES, `${messages} messages of half a file`);
+
+  // A run's variables, and the lines that its robots print.
+  const program = path.join(scratch, "counting.c");
+  fs.writeFileSync(program, `#include "kilolib.h"
+#define DEBUG
+#include "debug.h"
+volatile int turns;
+void setup() {}
+void loop() { if (kilo_ticks >= 31 * (turns + 1)) { turns++; printf("turn %d of robot %d\\n", turns, kilo_uid); } }
+int main() { kilo_init(); debug_init(); kilo_start(setup, loop); return 0; }
+`);
+  const experiment = path.join(scratch, "counting.txtpb");
+  fs.writeFileSync(experiment, `duration_s: 5 seed: 1 arena { width_mm: 500 height_mm: 500 }
+robots { count: 3 behaviour: "counting.c" layout { grid { pitch_mm: 60 } } }
+recording { variable { name: "turns" every_s: 0.5 } variable { name: "radio_sent" every_s: 1 } }
+`);
+  const ran = path.join(scratch, "ran");
+  execFileSync(kilotwin, ["run", experiment, "--mode", "local", "--quiet", "--out", ran]);
+  execFileSync(kilotwin, ["export", ran, "--mcap", file]);
+  const counted = await mcap.McapIndexedReader.Initialize({ readable: new Bytes(fs.readFileSync(file)) });
+  const typesOf = new Map([...counted.schemasById.values()].map((schema) => [schema.id, decoderOf(schema)]));
+  const [said, turns] = [[], []];
+  let before = 0n;
+  for await (const message of counted.readMessages()) {
+    assert.ok(message.logTime >= before, "times ascend");
+    before = message.logTime;
+    const { topic, schemaId } = counted.channelsById.get(message.channelId);
+    const value = typesOf.get(schemaId).decode(message.data);
+    if (topic === "/log" && value.name.startsWith("robot ")) said.push([value.name, value.message, Number(message.logTime) / 1e9]);
+    if (topic === "/variables/turns") turns.push(value);
+    if (topic === "/variables/radio_sent") assert.equal(value.robot.length, 3);
+  }
+  assert.equal(said.length, 12, JSON.stringify(said)); // of 3 robots, once per 31 kilo_ticks
+  for (const [name, text, time] of said) {
+    const [turn, robot] = text.match(/^turn (\d+) of robot (\d+)$/).slice(1).map(Number);
+    assert.equal(name, `robot ${robot}`);
+    assert.ok(Math.abs(time - turn) < 0.1, `${text} at ${time}`);
+  }
+  assert.deepEqual(turns[0].robot, [0, 1, 2]);
+  assert.equal(turns.at(-1).mean, 4);
+  assert.deepEqual(turns.at(-1).value, [4, 4, 4]);
   console.log(`${bytes.length} bytes, ${reader.statistics.messageCount} messages, ${reader.chunkIndexes.length} chunks`);
 } finally {
   fs.rmSync(scratch, { recursive: true });

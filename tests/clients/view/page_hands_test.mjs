@@ -50,7 +50,7 @@ function standingExperiment() {
   return write("stand.txtpb", `duration_s: 900 seed: 3 arena { width_mm: 2000 height_mm: 2000 }
     robots { count: 20 behaviour: "stand.c" layout { x_mm: -500 grid { pitch_mm: 90 heading: HEADING_FIXED } } }
     movable { box { width_mm: 120 length_mm: 200 } mass_g: 400 x_mm: -300 y_mm: 500 }
-    recording { every_s: 0.5 event: SENT event: RECEIVED }`);
+    recording { every_s: 0.5 }`);
 }
 
 async function drag(page, from, to, withShift = false) {
@@ -72,13 +72,14 @@ async function movesAndHandOvers() {
   await phase(page, "live: running");
   assert.match(await text(page, "run-facts"), /partitions2 × 1margin of ghosts[1-9]\d* mm/);
 
-  // Messages come with the metrics of the radio. The federates say what they do.
+  // Messages, counters and variables are recorded for the page. Messages come with the metrics of the radio. The federates say what they do.
   await eventually("messages", async () => (await counter(page, "flights")) > 0);
   await eventually("federates", async () => (await page.locator("#federates li").count()) >= 5);
   assert.match(await text(page, "federates"), /physics 0,0computes \d+, exchanges \d+, waits \d+ %/);
   await eventually("nobody holds up a run at its pace", async () => (await text(page, "work-verdict")).startsWith("Nobody holds up"));
   await select(page, 7);
   await eventually("its messages", async () => /messages sent[1-9]\d*…?received[1-9]\d*…?heard most\d+ \(/.test(await text(page, "robot-facts")));
+  await eventually("its counters", async () => /radio_sent[1-9]\d*/.test(await text(page, "robot-variables")));
   await eventually("lines from robots that it heard", async () => (await saved(page, "Save the picture as SVG")).toString().includes('stroke-opacity="0.4"'));
   await picture(page, "messages");
 

@@ -221,6 +221,8 @@ async function plotsAndPrograms() {
   // Where the time went: a run in one process has its cost by subject.
   await eventually("the cost", async () => (await text(page, "federates")).includes("behaviours"));
   assert.equal(await text(page, "work-verdict"), "All engines share one process.");
+  assert.match(await text(page, "run-facts"), /messages sent\d+.*received\d+.*mean speed\d/s);
+  assert.equal(await text(page, "speed-what"), "playback");
 
   // Alarms of the residual monitor, up to this time.
   assert.equal(await text(page, "alarm-lines"), "12.0 s: robot 2 <b>leaves</b> the model");

@@ -61,14 +61,22 @@ TEST(LiveWork, IsThatOfTheLastSeconds) {
 TEST(WorkText, NamesFederatesOrSubjects) {
   recorder::Summary summary;
   summary.cost_ns_per_robot_tick = {300, 200, 500, 0, 0, 10};
+  summary.messages = {12, 10, 40, 1};
+  summary.ticks = 100;
+  summary.simulated_s = 3.2768;
+  summary.wall_s = 0.5;
   const json local = json::parse(work_text(summary));
   EXPECT_TRUE(local["federates"].empty());
   EXPECT_EQ(local["cost"][2], (json{{"name", "radio"}, {"ns", 500.0}}));
   EXPECT_EQ(local["cost"].size(), 4u);
+  EXPECT_EQ(local["sent"], 10u);
+  EXPECT_EQ(local["received"], 40u);
+  EXPECT_EQ(local["meanSpeed"], summary.realtime_factor());
+  EXPECT_GT(summary.realtime_factor(), 0);
   summary.federates = {{"radio", 1, 0.5, 2}};
   const json federated = json::parse(work_text(summary));
   EXPECT_EQ(federated["federates"][0], (json{{"name", "radio"}, {"step", 1.0}, {"exchange", 0.5}, {"wait", 2.0}}));
-  EXPECT_TRUE(federated["cost"].empty());
+  EXPECT_EQ(federated["cost"], local["cost"]);
 }
 
 TEST(WatchedPlan, HasTheMarginOfTheRunsOwnPlan) {
