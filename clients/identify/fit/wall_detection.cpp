@@ -51,18 +51,37 @@ double upper_wall(std::vector<Place> places, double noise_mm, Evidence fewest) {
 
 /// A side that no robot reached. The arena's centre is the origin if the sides of the other pair are symmetric about it; then the
 /// side is as far from it as the opposite one. Infinite without that, or if robots were beyond.
-double mirrored(double opposite_mm, double low_mm, double high_mm, const std::vector<Place>& towards) {
+double mirrored(double opposite_mm, double low_mm, double high_mm, double reached_mm) {
   constexpr double kNone = std::numeric_limits<double>::infinity(), kSymmetric = 0.005, kBeyond_mm = 4;
   const bool centred = std::abs(low_mm + high_mm) < kSymmetric * (high_mm - low_mm);
   if (!std::isfinite(low_mm) || !std::isfinite(high_mm) || !std::isfinite(opposite_mm) || !centred) return kNone;
   const double side_mm = std::abs(opposite_mm);
-  const auto beyond =
-      std::count_if(towards.begin(), towards.end(), [&](const Place& p) { return p.at_mm > side_mm + kBeyond_mm; });
-  // Outliers may lie beyond the wall.
-  return static_cast<std::size_t>(beyond) > std::max<std::size_t>(3, towards.size() / 2000) ? kNone : side_mm;
+  return reached_mm > side_mm + kBeyond_mm ? kNone : side_mm;
+}
+
+/// The largest coordinate without outliers; 0 without places.
+double farthest(std::vector<Place> places) {
+  if (places.empty()) return 0;
+  const std::size_t beyond = std::min(std::max<std::size_t>(3, places.size() / 2000), places.size() - 1);
+  const auto edge = places.begin() + static_cast<std::ptrdiff_t>(beyond);
+  std::nth_element(places.begin(), edge, places.end(),
+                   [](const Place& a, const Place& b) { return a.at_mm > b.at_mm; });
+  return edge->at_mm;
 }
 
 }  // namespace
+
+void add_implied_side(Walls& walls, const Walls& reached) {
+  const Walls w = walls;
+  if (!std::isfinite(w.x_low_mm))
+    walls.x_low_mm = -mirrored(w.x_high_mm, w.y_low_mm, w.y_high_mm, -reached.x_low_mm);
+  if (!std::isfinite(w.x_high_mm))
+    walls.x_high_mm = mirrored(w.x_low_mm, w.y_low_mm, w.y_high_mm, reached.x_high_mm);
+  if (!std::isfinite(w.y_low_mm))
+    walls.y_low_mm = -mirrored(w.y_high_mm, w.x_low_mm, w.x_high_mm, -reached.y_low_mm);
+  if (!std::isfinite(w.y_high_mm))
+    walls.y_high_mm = mirrored(w.y_low_mm, w.x_low_mm, w.x_high_mm, reached.y_high_mm);
+}
 
 Walls detected_walls(const PreparedSet& set, const MotionModel& model) {
   std::vector<Place> x, y;
@@ -103,10 +122,7 @@ Walls detected_walls(const PreparedSet& set, const MotionModel& model) {
       std::count_if(sides.begin(), sides.end(), [](double s) { return std::isfinite(s); }) >= kMostSides;
   if (!closed) return walls;
   Walls all = seen({8, 1});
-  if (!std::isfinite(all.x_low_mm)) all.x_low_mm = -mirrored(all.x_high_mm, all.y_low_mm, all.y_high_mm, x_turned);
-  if (!std::isfinite(all.x_high_mm)) all.x_high_mm = mirrored(all.x_low_mm, all.y_low_mm, all.y_high_mm, x);
-  if (!std::isfinite(all.y_low_mm)) all.y_low_mm = -mirrored(all.y_high_mm, all.x_low_mm, all.x_high_mm, y_turned);
-  if (!std::isfinite(all.y_high_mm)) all.y_high_mm = mirrored(all.y_low_mm, all.x_low_mm, all.x_high_mm, y);
+  add_implied_side(all, {-farthest(x_turned), farthest(x), -farthest(y_turned), farthest(y)});
   return all;
 }
 

@@ -9,4 +9,8 @@ namespace kilotwin::identify {
 /// one, the fourth may have been reached by none: in an arena about the origin it mirrors the opposite one.
 [[nodiscard]] Walls detected_walls(const PreparedSet&, const MotionModel&);
 
+/// Adds the one side of four that has no wall yet, if the others imply it: it mirrors the opposite one in an arena about the
+/// origin. `reached`: how far disc centres went towards each side, outliers left out; a side that they went beyond stays open.
+void add_implied_side(Walls&, const Walls& reached);
+
 }  // namespace kilotwin::identify

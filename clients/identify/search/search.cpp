@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "clients/identify/search/amplitudes.hpp"
 #include "clients/identify/search/calibration_shifts.hpp"
@@ -49,6 +50,8 @@ constexpr int kMostGeneral = 3;
 constexpr std::size_t kMostTries = 4;
 /// Key of a general term among the failed hypotheses.
 constexpr const char* kGeneral = "general ";
+/// The same of a wave among named hypotheses.
+constexpr const char* kWave = "wave";
 
 class Loop {
  public:
@@ -85,10 +88,13 @@ class Loop {
     const ScoreTest::Outcome outcome = score_test_->test(kSeed + static_cast<std::uint64_t>(round_));
     note_rejected(outcome);
     // A hypothesis that fails leaves the state as it was, so that the outcome of the tests remains valid.
+    bool waves_tried = false;
     while (const Finding* const best = best_of(outcome, kRemnant * explained())) {
       out_.limit = limit();
       if (!out_.limit.empty()) break;
-      if (lag_explains(*best) || accepted(*best, outcome)) return true;
+      if (lag_explains(*best)) return true;
+      if (!std::exchange(waves_tried, true) && accept_wave(best->evidence)) return true;
+      if (accepted(*best, outcome)) return true;
     }
     say("testing alternatives", 0.5);
     return eliminate() || accept_general();
@@ -209,7 +215,28 @@ class Loop {
     Term term;
     Reason reason;
   };
-  /// Those that pass the tests, of each name the one with the most evidence, in the order of their evidence.
+  /// Adds the hypotheses of a family that pass the tests, of each name the one with the most evidence.
+  void add_candidates(const Dictionary& family, bool general, double least_evidence,
+                      std::map<std::string, GeneralTerm>& best) {
+    std::vector<Block> blocks = blocks_of(out_.fit.model);
+    blocks.insert(blocks.end(), family.blocks.begin(), family.blocks.end());
+    const std::vector<Unit> units =
+        linearise(out_.fit.model, tested_units(kEnoughForGeneral), blocks, {100, fitter_.threads()});
+    const ScoreTest test(fitter_, out_.fit.model, units, family);
+    const ScoreTest::Outcome outcome = test.test(kSeed + 100 + static_cast<std::uint64_t>(round_));
+    for (const Finding& f : outcome.findings) {
+      const Hypothesis& h = family.hypotheses[f.hypothesis];
+      const auto known = best.find(h.name);
+      if (!good(f, outcome.threshold_log10_p) || f.evidence < least_evidence ||
+          failed_.contains(kGeneral + h.name) ||
+          (known != best.end() && f.evidence <= known->second.reason.finding.evidence))
+        continue;
+      GeneralTerm one{family.term_of(h, f.relative_scale), {h.covariates, h.acts_on, f, outcome.threshold_log10_p}};
+      one.term.general = general;
+      best.insert_or_assign(h.name, std::move(one));
+    }
+  }
+  /// Those of all families, in the order of their evidence.
   std::vector<GeneralTerm> general_candidates() {
     if (general_.empty()) general_ = general_dictionaries_of(extent_);
     std::vector<Dictionary> families = general_;
@@ -218,25 +245,9 @@ class Loop {
     std::map<std::string, GeneralTerm> best;
     const double least = kRemnant * explained();
     for (const Dictionary& family : families) {
-      std::vector<Block> blocks = blocks_of(out_.fit.model);
-      blocks.insert(blocks.end(), family.blocks.begin(), family.blocks.end());
-      const std::vector<Unit> units =
-          linearise(out_.fit.model, tested_units(kEnoughForGeneral), blocks, {100, fitter_.threads()});
-      const ScoreTest test(fitter_, out_.fit.model, units, family);
-      const ScoreTest::Outcome outcome = test.test(kSeed + 100 + static_cast<std::uint64_t>(round_));
       // Waves have a form of their own, with a name.
       const bool waves = &family == &families.back() && families.size() > general_.size();
-      for (const Finding& f : outcome.findings) {
-        const Hypothesis& h = family.hypotheses[f.hypothesis];
-        const auto known = best.find(h.name);
-        if (!good(f, outcome.threshold_log10_p) || f.evidence < least || failed_.contains(kGeneral + h.name) ||
-            (known != best.end() && f.evidence <= known->second.reason.finding.evidence))
-          continue;
-        GeneralTerm one{family.term_of(h, f.relative_scale),
-                        {h.covariates, h.acts_on, f, outcome.threshold_log10_p}};
-        one.term.general = !waves;
-        best.insert_or_assign(h.name, std::move(one));
-      }
+      add_candidates(family, !waves, least, best);
     }
     std::vector<GeneralTerm> ranked;
     for (auto& [name, one] : best) ranked.push_back(std::move(one));
@@ -246,31 +257,54 @@ class Loop {
     if (ranked.size() > kMostTries) ranked.resize(kMostTries);
     return ranked;
   }
+  /// Adds a term. Returns false, with the state as before, if the likelihood does not rise. `key`: among the failed hypotheses.
+  bool fits(GeneralTerm one, const std::string& key) {
+    constexpr double kLeastRise = 3;
+    const Search before = out_;
+    const double likelihood = fitter_.log_likelihood_of_all(out_.fit);
+    out_.steps.push_back({one.term.name, one.reason.finding.held_out});
+    out_.fit.model.terms.push_back(std::move(one.term));
+    out_.reasons.push_back(std::move(one.reason));
+    say("fitting", 0.3);
+    fitter_.fit(out_.fit, 2);
+    refine_shape(out_.fit.model.terms.size() - 1);
+    fitter_.fit_contacts(out_.fit);
+    if (fitter_.log_likelihood_of_all(out_.fit) >= likelihood + kLeastRise) return true;
+    out_ = before;
+    failed_.insert(key);
+    return false;
+  }
+  /// A travelling wave with more evidence than the best hypothesis, which may be a proxy of it: adds the wave. A wave that
+  /// repeats neither within a run nor on the floor is left to the other hypotheses: it may be a proxy itself.
+  bool accept_wave(double evidence) {
+    constexpr double kFewestPeriods = 1.5, kFewestStripes = 4;
+    if (failed_.contains(kWave)) return false;
+    const Dictionary waves = wave_dictionary_of(fitter_, out_.fit, extent_);
+    if (waves.hypotheses.empty()) return false;
+    std::map<std::string, GeneralTerm> best;
+    add_candidates(waves, false, evidence, best);
+    if (best.empty()) return false;
+    GeneralTerm& wave = best.begin()->second;
+    const std::vector<double>& numbers = wave.term.blocks.front().basis.factors.front().points;
+    const double periods = std::abs(numbers[2]) * extent_.duration_s / (2 * M_PI),
+                 stripes = (std::abs(numbers[0]) * (extent_.x_high_mm - extent_.x_low_mm) +
+                            std::abs(numbers[1]) * (extent_.y_high_mm - extent_.y_low_mm)) /
+                           (2 * M_PI);
+    if (periods < kFewestPeriods && stripes < kFewestStripes) return false;
+    return fits(std::move(wave), kWave);
+  }
   /// Adds the general term with the most evidence that fits, if much is left unexplained. Returns whether there is one.
   bool accept_general() {
-    constexpr double kLeastRise = 3;
     if (general_terms_ == kMostGeneral || !limit().empty() || !leaves_much_ || !leaves_much_(out_.fit))
       return false;
     say("testing general terms", 0.7);
-    const Search before = out_;
-    const double likelihood = fitter_.log_likelihood_of_all(out_.fit);
     for (GeneralTerm& one : general_candidates()) {
       if (worked_out()) break;
-      const std::string name = one.term.name;
-      out_.fit.model.terms.push_back(std::move(one.term));
-      out_.reasons.push_back(std::move(one.reason));
-      say("fitting", 0.3);
-      fitter_.fit(out_.fit, 2);
-      refine_shape(out_.fit.model.terms.size() - 1);
-      fitter_.fit_contacts(out_.fit);
-      out_.steps.push_back({name, out_.reasons.back().finding.held_out});
-      if (fitter_.log_likelihood_of_all(out_.fit) >= likelihood + kLeastRise) {
-        ++general_terms_;
-        --eliminations_;
-        return true;
-      }
-      out_ = before;
-      failed_.insert(kGeneral + name);
+      const std::string key = kGeneral + one.term.name;
+      if (!fits(std::move(one), key)) continue;
+      ++general_terms_;
+      --eliminations_;
+      return true;
     }
     if (worked_out()) out_.limit = limit();
     return false;
@@ -368,11 +402,18 @@ class Loop {
 
   /// Refines the shape of a term.
   void refine_shape(std::size_t place) {
-    if (out_.fit.model.terms[place].general) return refit(fitter_, out_.fit, place);
+    if (out_.fit.model.terms[place].general) {
+      refit(fitter_, out_.fit, place);
+      simplify_to_switch(fitter_, out_.fit, place);
+      return;
+    }
     if (!refine_neighbour_shape(fitter_, out_.fit, place) && !refine_traffic_shape(fitter_, out_.fit, place))
       refine_curves(fitter_, out_.fit, place);
-    const std::string before = out_.fit.model.terms[place].name,
-                      name = find_change_points(fitter_, out_.fit, place);
+    // What smooth curves leave of a switch would pass the tests as one further term after another.
+    if (simplify_to_switch(fitter_, out_.fit, place)) return;
+    const std::string before = out_.fit.model.terms[place].name;
+    if (refine_wave_numbers(fitter_, out_.fit, place)) refit(fitter_, out_.fit, place);
+    const std::string name = find_change_points(fitter_, out_.fit, place);
     if (name != before) {
       for (const Hypothesis& h : dictionary_.hypotheses) {
         if (h.name != name) continue;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "clients/identify/search/local_quadratic.hpp"
@@ -151,59 +152,133 @@ const Factor* amplitudes_over_time(const Term& term) {
   return factors[0].shape == Shape::kTable && over_time ? factors.data() : nullptr;
 }
 
-/// Replaces curves of robots or commands over time by amplitudes that begin at one instant, if those do as well.
+/// Amplitudes of some keys that begin at one instant, which lies in a span.
+struct SwitchGroup {
+  Factor table;
+  double low_s, high_s;
+};
+
+Block beginning(const Block& like, const Factor& curve, const SwitchGroup& group, std::vector<double> at_s) {
+  Block block = like;
+  block.basis = form(curve, Shape::kAtLeast, 1, std::move(at_s)).basis;
+  block.basis.factors.push_back(group.table);
+  return block;
+}
+
+/// The chosen instant of each group on a raster: its index, or none.
+struct ChosenInstants {
+  std::vector<std::optional<std::size_t>> at;
+  double sd = 0, evidence = 0;
+};
+
+/// `points`: instants per group. Columns: by group, then by instant, then by key.
+ChosenInstants choose_instants(const ReducedColumns& data, const std::vector<SwitchGroup>& groups,
+                               std::size_t points) {
+  ChosenInstants best;
+  const double smallest = 1 / std::sqrt(std::max(data.information.diagonal().maxCoeff(), 1e-12));
+  for (double sd = smallest; sd < 4000 * smallest; sd *= 3) {
+    ChosenInstants trial{{}, sd, 0};
+    Eigen::Index next = 0;
+    for (const SwitchGroup& group : groups) {
+      const auto keys = static_cast<Eigen::Index>(group.table.points.size());
+      double most = 0;
+      trial.at.emplace_back();
+      for (std::size_t i = 0; i < points; ++i, next += keys) {
+        const double evidence = log_evidence(data.information.block(next, next, keys, keys),
+                                             data.score.segment(next, keys), Eigen::VectorXd::Constant(keys, sd)) -
+                                std::log(static_cast<double>(points));
+        if (!(evidence > most)) continue;
+        most = evidence;
+        trial.at.back() = i;
+      }
+      trial.evidence += most;
+    }
+    if (trial.evidence > best.evidence) best = std::move(trial);
+  }
+  return best;
+}
+
+/// The term as amplitudes that begin at one instant per group, on finer and finer rasters. Groups without evidence for an
+/// instant are left out. Nothing if none has one.
+std::optional<FitState> with_switches(const Fitter& fitter, FitState state, std::size_t place, const Factor& curve,
+                                      std::vector<SwitchGroup> groups) {
+  constexpr std::size_t kFirst = 12, kNext = 6;
+  const Block like = state.model.terms[place].blocks.front();
+  for (std::size_t points = kFirst; groups.front().high_s - groups.front().low_s > 1; points = kNext) {
+    std::vector<Block> blocks;
+    std::vector<std::vector<double>> rasters;
+    for (const SwitchGroup& group : groups) {
+      std::vector<double>& at_s = rasters.emplace_back();
+      for (std::size_t i = 1; i <= points; ++i)
+        at_s.push_back(group.low_s +
+                       static_cast<double>(i) * (group.high_s - group.low_s) / static_cast<double>(points + 1));
+      const auto each = std::max<std::size_t>(1, kMostColumns / group.table.points.size());
+      for (std::size_t first = 0; first < points; first += each) {
+        const auto end = at_s.begin() + static_cast<std::ptrdiff_t>(std::min(points, first + each));
+        blocks.push_back(beginning(like, curve, group, {at_s.begin() + static_cast<std::ptrdiff_t>(first), end}));
+      }
+    }
+    const LocalQuadratic l = local_quadratic(fitter, state, place, blocks);
+    const Eigen::VectorXd score = l.score_without(state.model.terms[place].coefficients);
+    const ChosenInstants chosen = choose_instants(reduced_columns(l, score, l.added_columns()), groups, points);
+    std::vector<SwitchGroup> kept;
+    std::vector<Block> put;
+    std::vector<Eigen::Index> columns;
+    Eigen::Index next = l.own;
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      const auto keys = static_cast<Eigen::Index>(groups[g].table.points.size());
+      const Eigen::Index first = next;
+      next += keys * static_cast<Eigen::Index>(points);
+      if (chosen.at.empty() || !chosen.at[g]) continue;
+      const double at_s = rasters[g][*chosen.at[g]],
+                   apart_s = (groups[g].high_s - groups[g].low_s) / static_cast<double>(points + 1);
+      put.push_back(beginning(like, curve, groups[g], {at_s}));
+      for (Eigen::Index k = 0; k < keys; ++k)
+        columns.push_back(first + static_cast<Eigen::Index>(*chosen.at[g]) * keys + k);
+      kept.push_back({groups[g].table, at_s - apart_s, at_s + apart_s});
+    }
+    if (kept.empty()) return std::nullopt;
+    replace_blocks(state.model, place, l, put, score, columns,
+                   Eigen::VectorXd::Constant(static_cast<Eigen::Index>(columns.size()), chosen.sd));
+    groups = std::move(kept);
+  }
+  state.model.terms[place].general = false;
+  fitter.fit(state, 2);
+  return state;
+}
+
+}  // namespace
+
 bool simplify_to_switch(const Fitter& fitter, FitState& state, std::size_t place) {
   const Factor* const factors = amplitudes_over_time(state.model.terms[place]);
   if (factors == nullptr || factors[0].points.empty() || factors[0].points.size() > kMostColumns / 2) return false;
   const Factor table = factors[0], curve = factors[1];
-  const Block like = state.model.terms[place].blocks.front();
-  const auto keys = static_cast<Eigen::Index>(table.points.size());
-  const auto each = std::max<std::size_t>(1, kMostColumns / table.points.size());
-  constexpr std::size_t kFirst = 12, kNext = 6;
-  FitState simple = state;
-  double low_s = curve.low, high_s = curve.high;
-  for (std::size_t points = kFirst; high_s - low_s > 1; points = kNext) {
-    const double apart_s = (high_s - low_s) / static_cast<double>(points + 1);
-    std::vector<double> at;
-    for (std::size_t i = 1; i <= points; ++i) at.push_back(low_s + static_cast<double>(i) * apart_s);
-    std::vector<Block> blocks;
-    for (std::size_t first = 0; first < points; first += each) {
-      Block block = like;
-      const auto end = at.begin() + static_cast<std::ptrdiff_t>(std::min(points, first + each));
-      Factor begins =
-          form(curve, Shape::kAtLeast, 1, {at.begin() + static_cast<std::ptrdiff_t>(first), end}).basis.factors[0];
-      block.basis = Basis{{begins, table}};
-      blocks.push_back(std::move(block));
-    }
-    const LocalQuadratic l = local_quadratic(fitter, simple, place, blocks);
-    const Eigen::VectorXd score = l.score_without(simple.model.terms[place].coefficients);
-    const ReducedColumns data = reduced_columns(l, score, l.added_columns());
-    std::vector<SimpleForm> instants;
-    for (std::size_t i = 0; i < points; ++i) {
-      SimpleForm one = form(curve, Shape::kAtLeast, 1, {at[i]});
-      one.basis.factors.push_back(table);
-      one.first = static_cast<Eigen::Index>(i) * keys;
-      instants.push_back(std::move(one));
-    }
-    const BestForm best = best_of(instants, data, 1);
-    if (best.form == nullptr) return false;
-    std::vector<Eigen::Index> columns;
-    for (const Eigen::Index c : best.columns) columns.push_back(l.own + c);
-    replace_blocks(simple.model, place, l, {{like.target, best.form->basis, like.during}}, score, columns, best.sd);
-    const double found_s = best.form->basis.factors.front().points.front();
-    low_s = found_s - apart_s;
-    high_s = found_s + apart_s;
+  const std::vector<SwitchGroup> together{{table, curve.low, curve.high}};
+  std::vector<SwitchGroup> each;
+  for (const double key : table.points) {
+    each.push_back({table, curve.low, curve.high});
+    each.back().table.points = {key};
   }
-  simple.model.terms[place].general = false;
-  fitter.fit(simple, 2);
-  constexpr double kChoice = 5;  // log of the number of instants
-  const double lost = fitter.log_likelihood(state) - fitter.log_likelihood(simple);
-  if (lost > cost_of(fitter, state, place) - cost_of(fitter, simple, place) - kChoice) return false;
-  state = std::move(simple);
-  return true;
+  double best = fitter.log_likelihood(state) - cost_of(fitter, state, place);
+  bool replaced = false;
+  const FitState curves = state;
+  for (const std::vector<SwitchGroup>& groups : {together, each}) {
+    constexpr std::size_t kMostGroups = 24;
+    if (groups.size() > kMostGroups) continue;
+    std::optional<FitState> trial = with_switches(fitter, curves, place, curve, groups);
+    if (!trial) continue;
+    constexpr double kChoice = 5;  // log of the number of instants
+    const auto instants = groups.size() == 1 ? 1 : trial->model.terms[place].blocks.size();
+    const double value =
+        fitter.log_likelihood(*trial) - cost_of(fitter, *trial, place) - kChoice * static_cast<double>(instants);
+    // Negated, so that a likelihood that is no number does not count.
+    if (!(value > best)) continue;
+    best = value;
+    replaced = true;
+    state = std::move(*trial);
+  }
+  return replaced;
 }
-
-}  // namespace
 
 bool simplify(const Fitter& fitter, FitState& state, std::size_t place) {
   if (simplify_to_switch(fitter, state, place)) return true;

@@ -6,6 +6,10 @@
 
 namespace kilotwin::identify {
 
+/// Curves of robots or commands over time: replaced by amplitudes that begin at one instant, or at one instant per robot or
+/// command, if those do as well. Returns whether they were replaced.
+bool simplify_to_switch(const Fitter&, FitState&, std::size_t term);
+
 /// Returns whether a simpler form replaced the term's curves.
 bool simplify(const Fitter&, FitState&, std::size_t term);
 

@@ -1,11 +1,14 @@
 #include "clients/identify/search/travelling_waves.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <complex>
+#include <utility>
 
 #include "clients/identify/search/dictionary_builder.hpp"
+#include "clients/identify/search/local_quadratic.hpp"
 #include "clients/identify/search/visits.hpp"
 #include "core/os/worker_pool.hpp"
 
@@ -131,7 +134,88 @@ Raster raster_of(double width_mm, double height_mm, double duration_s, std::size
   }
 }
 
+/// The wave of a term that is one wave; null: another term.
+Factor* wave_of(Term& term) {
+  if (term.blocks.size() != 1 || term.blocks.front().basis.factors.size() != 1) return nullptr;
+  Factor& f = term.blocks.front().basis.factors.front();
+  return f.shape == Factor::Shape::kTravelling && f.known.empty() ? &f : nullptr;
+}
+
+/// The derivative of a fitted wave by its phase.
+Factor derivative_of(const Factor& wave, const Basis& basis, const Eigen::VectorXd& coefficients) {
+  Factor slope = wave;
+  slope.known.assign(wave.columns(), 0);
+  for (Eigen::Index i = 0; i < coefficients.size(); ++i) {
+    const std::size_t column =
+        basis.chosen.empty() ? static_cast<std::size_t>(i) : basis.chosen[static_cast<std::size_t>(i)];
+    const double k = wave.first + static_cast<double>(column / 2);
+    // cos(k p) has the derivative -k sin(k p), sin(k p) has k cos(k p).
+    if (column % 2 == 0)
+      slope.known[column + 1] -= k * coefficients[i];
+    else
+      slope.known[column - 1] += k * coefficients[i];
+  }
+  return slope;
+}
+
+/// A wave that moves by less than half a period in a run stands still if that is as likely: stripes of the floor. Returns
+/// whether it does.
+bool stand_still(const Fitter& fitter, FitState& state, std::size_t place, double duration_s, double likelihood) {
+  constexpr double kMostLost = 3;  // as the choice of one number costs
+  if (std::abs(wave_of(state.model.terms[place])->points[2]) * duration_s > M_PI) return false;
+  FitState trial = state;
+  Term& term = trial.model.terms[place];
+  wave_of(term)->points[2] = 0;
+  term.name = "speed-by-position";
+  fitter.fit(trial, 2);
+  if (!(fitter.log_likelihood(trial) > likelihood - kMostLost)) return false;
+  state = std::move(trial);
+  return true;
+}
+
 }  // namespace
+
+bool refine_wave_numbers(const Fitter& fitter, FitState& state, std::size_t place) {
+  constexpr int kMostPasses = 6;
+  constexpr double kSettled = 1;
+  if (wave_of(state.model.terms[place]) == nullptr) return false;
+  const Extent extent = extent_of(state.tracks);
+  const std::array<Factor, 3> along{
+      over(Factor::Shape::kLinear, Covariate::kX, extent.x_low_mm, extent.x_high_mm, 1),
+      over(Factor::Shape::kLinear, Covariate::kY, extent.y_low_mm, extent.y_high_mm, 1),
+      over(Factor::Shape::kLinear, Covariate::kTime, 0, extent.duration_s, 1)};
+  bool changed = false;
+  double likelihood = fitter.log_likelihood(state);
+  for (int pass = 0; pass < kMostPasses; ++pass) {
+    Term& term = state.model.terms[place];
+    const Block& block = term.blocks.front();
+    const Factor slope = derivative_of(*wave_of(term), block.basis, term.coefficients);
+    std::vector<Block> blocks;
+    for (const Factor& covariate : along) blocks.push_back({block.target, Basis{{covariate, slope}}, block.during});
+    const LocalQuadratic l = local_quadratic(fitter, state, state.model.terms.size(), blocks, true);
+    Eigen::MatrixXd information = l.information;
+    information.diagonal() += l.prior;
+    const Eigen::Vector3d step = information.ldlt().solve(l.score).tail<3>();
+    bool better = false;
+    for (const double length : {1.0, 0.4, 0.16}) {
+      FitState trial = state;
+      std::vector<double>& numbers = wave_of(trial.model.terms[place])->points;
+      for (std::size_t d = 0; d < numbers.size(); ++d)
+        numbers[d] +=
+            (d == 2 ? -1 : 1) * length * step[static_cast<Eigen::Index>(d)] / (along[d].high - along[d].low);
+      fitter.fit(trial, 2);
+      const double found = fitter.log_likelihood(trial);
+      // Negated, so that a likelihood that is no number is no progress.
+      if (!(found > likelihood + kSettled)) continue;
+      likelihood = found;
+      state = std::move(trial);
+      better = changed = true;
+      break;
+    }
+    if (!better) break;
+  }
+  return stand_still(fitter, state, place, extent.duration_s, likelihood) || changed;
+}
 
 Dictionary wave_dictionary_of(const Fitter& fitter, const FitState& state, const Extent& extent) {
   Dictionary dictionary;

@@ -10,4 +10,9 @@ namespace kilotwin::identify {
 /// too little of floor and time.
 [[nodiscard]] Dictionary wave_dictionary_of(const Fitter&, const FitState&, const Extent&);
 
+/// Fits wave numbers and frequency of a term that is one wave, by Gauss-Newton steps on the likelihood of the tracks. The
+/// periodogram has them only roughly: its residuals contain what the rest of the model missed at that time. A wave that stands
+/// still becomes an effect of the position, with its name. Returns whether the wave changed.
+bool refine_wave_numbers(const Fitter&, FitState&, std::size_t term);
+
 }  // namespace kilotwin::identify
