@@ -131,7 +131,11 @@ TEST(Mcu, ProgramsThatWaitAreWhereLibsimavrHasThem) {
                              "kilo_message_rx = receive;")),
       firmware(whole_program(rx + "static void loop(void) { sum += get_ambientlight(); set_color(sum >> 4); }",
                              "kilo_message_rx = receive;")),
-      firmware(whole_program(rx + "static void loop(void) { ++sum; }", "kilo_message_rx = receive;"))};
+      firmware("#include <avr/io.h>\n" +
+               whole_program(
+                   rx + "static void loop(void) { ADMUX = 0x47; ADCSRA = 0xc7; uint8_t first, second;\n"
+                        "  do { first = ADCSRA; second = ADCSRA; } while (first & second & 0x40); sum += ADC; }",
+                   "kilo_message_rx = receive;"))};
   senses::Readings readings{};
   readings.light = 300;
   readings.light_sd = 4;
