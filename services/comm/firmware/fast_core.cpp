@@ -3,6 +3,8 @@
 #include <simavr/sim_avr.h>
 
 #include <algorithm>
+#include <cstring>
+#include <utility>
 
 namespace kilotwin::firmware {
 namespace {
@@ -72,13 +74,24 @@ enum Kind : std::uint8_t {
   kReadRegister,
   kWriteDirections,
   kReadFlags,
-  kDelayBySbiw
+  kDelayBySbiw,
+  kPoll
 };
 
 /// DDRB, DDRC and DDRD; the PORT register follows each.
 constexpr std::uint32_t kDdrB = 0x24, kDdrC = 0x27, kDdrD = 0x2a;
 constexpr std::uint32_t kX = 26, kY = 28, kZ = 30, kSpl = 0x5d, kSph = 0x5e, kSreg = 0x5f;
-constexpr std::uint32_t kRam = 0x100, kRamEnd = 0x8ff;
+/// The converter's control register, which programs poll. libsimavr computes the comparator's output anew at each read of it, with
+/// the same result.
+constexpr std::uint32_t kAdcsra = 0x7a;
+constexpr std::uint32_t kRegisters = 0x20, kRam = 0x100, kRamEnd = 0x8ff;
+
+/// A longer loop is executed: little would be left of the time between two interrupts.
+constexpr std::uint64_t kLongestLoop = 32768;
+/// A state that did not come back after this number of backward jumps is replaced as soon as at the beginning.
+constexpr std::uint32_t kMostPatience = 4096;
+
+bool is_direction(std::uint32_t address) { return address == kDdrB || address == kDdrC || address == kDdrD; }
 
 bool is_long(std::uint32_t opcode) {
   return (opcode & 0xfc0f) == 0x9000 || (opcode & 0xfe0c) == 0x940c;  // LDS and STS; JMP and CALL
@@ -86,11 +99,28 @@ bool is_long(std::uint32_t opcode) {
 
 }  // namespace
 
-FastCore::FastCore(const std::uint8_t* flash)
-    : flash_(flash), operations_(std::make_unique<std::array<Operation, kFlashOctets / 2>>()) {}
+FastCore::FastCore(const avr_t& avr)
+    : flash_(avr.flash), operations_(std::make_unique<std::array<Operation, kFlashOctets / 2>>()) {
+  for (std::uint32_t address = kRegisters; address < kRam; ++address) {
+    const auto& one = avr.io[address - kRegisters];
+    const bool plain =
+        one.r.c == nullptr && (one.irq == nullptr || address == kAdcsra) && address != kSreg;
+    const bool is_own = address == kSpl || address == kSph;
+    plain_[address] = plain;
+    if ((plain && !is_own) || is_direction(address) || is_direction(address - 1)) inputs_[address] = 0xff;
+  }
+}
+
+/// Whether the I/O registers that instructions may look at are equal.
+bool FastCore::inputs_are(const avr_t& avr, const Memory& memory) const {
+  std::uint32_t differences = 0;
+  for (std::uint32_t i = kRegisters; i < kRam; ++i)
+    differences |= static_cast<std::uint32_t>((avr.data[i] ^ memory.data[i]) & inputs_[i]);
+  return differences == 0;
+}
 
 void FastCore::forget(std::uint32_t address, std::uint32_t octets) {
-  // An instruction before the page may reach into it, and one that skips looks at the next.
+  // An instruction before the page may reach into it; one that skips, delays or polls looks at the next ones.
   const std::uint32_t first = address / 2 < 4 ? 0 : address / 2 - 4;
   const std::uint32_t last = std::min<std::uint32_t>((address + octets) / 2, kFlashOctets / 2);
   for (std::uint32_t i = first; i < last; ++i) (*operations_)[i] = Operation();
@@ -154,9 +184,9 @@ FastCore::Operation FastCore::decode(std::uint32_t pc) const {
     case 0x9: break;
     case 0xb: {
       const std::uint32_t address = (o >> 5 & 0x30) + (o & 15) + 32;
-      const bool directions = address == kDdrB || address == kDdrC || address == kDdrD;
+      const bool directions = is_direction(address);
       if ((o & 0x0800) != 0) return directions ? Operation{kWriteDirections, d5, 0, 1, address} : other;
-      if (directions || address == kSpl || address == kSph) return {kReadRegister, d5, 0, 1, address};
+      if (directions || plain_[address]) return {kReadRegister, d5, 0, 1, address};
       return address == kSreg ? Operation{kReadFlags, d5, 0, 1, 0} : other;
     }
     case 0xc:
@@ -192,9 +222,17 @@ FastCore::Operation FastCore::decode(std::uint32_t pc) const {
   if ((o & 0x0800) != 0) return other;
   const auto address = [&] { return next + 2 < kFlashOctets ? word(next) : 0; };
   const auto in_ram = [](std::uint32_t a) { return a >= kRam && a <= kRamEnd; };
+  const auto readable = [&](std::uint32_t a) { return in_ram(a) || (a < kRam && plain_[a]); };
   if ((o & 0x0e00) == 0x0000) {
     switch (o & 15) {
-      case 0x0: return in_ram(address()) ? Operation{kLds, d5, 0, 2, address()} : other;
+      case 0x0: {
+        if (!readable(address())) return other;
+        // A poll: LDS, SBRC or SBRS of a bit of it, and RJMP back. In its `r`: the bit, and its value that goes on polling << 3.
+        const std::uint32_t skips = next + 6 < kFlashOctets ? word(next + 2) : 0;
+        const bool polls = (skips & 0xfdf8) == (0xfc00u | std::uint32_t{d5} << 4) && word(next + 4) == 0xcffc;
+        if (!polls) return {kLds, d5, 0, 2, address()};
+        return {kPoll, d5, static_cast<std::uint8_t>((skips & 7) | ((skips & 0x0200) != 0 ? 0 : 8)), 2, address()};
+      }
       case 0x1: return {kLdIncrement, d5, kZ, 1, 0};
       case 0x2: return {kLdDecrement, d5, kZ, 1, 0};
       case 0x4: return {kLpm, d5, 0, 1, 0};
@@ -253,6 +291,84 @@ FastCore::Operation FastCore::decode(std::uint32_t pc) const {
 }
 
 std::uint64_t FastCore::run(avr_t& avr, std::uint64_t cycles) {
+  if (waiting_.loop) {
+    if (inputs_are(avr, waiting_.loop->begin)) return skip(avr, cycles);
+    interrupt(avr);
+  }
+  if (anchor_.pc != kNowhere && !inputs_are(avr, anchor_.memory)) forget_anchor();
+  const std::uint64_t passed = execute<true>(avr, cycles);
+  return waiting_.loop && passed < cycles ? passed + skip(avr, cycles - passed) : passed;
+}
+
+/// Whether the program is back at the anchor's state, after a backward jump to `pc`; flags and data are in `avr`.
+bool FastCore::is_back(const avr_t& avr, std::uint32_t pc, std::uint64_t cycle) {
+  const auto equal = [&](std::uint32_t from, std::uint32_t to) {
+    return std::memcmp(avr.data + from, anchor_.memory.data.data() + from, to - from) == 0;
+  };
+  if (pc == anchor_.pc && equal(0, kRegisters) && equal(kSpl, kSreg + 1) && equal(kRam, kRamEnd + 1) &&
+      std::memcmp(avr.sreg, anchor_.memory.flags.data(), anchor_.memory.flags.size()) == 0)
+    return cycle - anchor_.cycle <= kLongestLoop;
+  if (++anchor_.jumps < anchor_.patience) return false;
+  anchor_.pc = pc;
+  anchor_.cycle = cycle;
+  anchor_.jumps = 0;
+  anchor_.patience = anchor_.patience < kMostPatience ? 2 * anchor_.patience : kFirstPatience;
+  std::memcpy(anchor_.memory.data.data(), avr.data, anchor_.memory.data.size());
+  std::memcpy(anchor_.memory.flags.data(), avr.sreg, anchor_.memory.flags.size());
+  return false;
+}
+
+/// Executes a loop once, one instruction at a time, to find where its instructions begin. It leaves the state as it was.
+void FastCore::enter_loop(avr_t& avr, std::uint32_t period) {
+  auto loop = std::make_shared<Loop>();
+  loop->begin = anchor_.memory;
+  loop->to_boundary.reserve(period);
+  while (loop->to_boundary.size() < period) {
+    const std::uint64_t took = execute<false>(avr, 1);
+    for (std::uint64_t left = took; left > 0; --left)
+      loop->to_boundary.push_back(static_cast<std::uint8_t>(left == took ? 0 : left));
+  }
+  avr.cycle -= period;
+  waiting_ = {std::move(loop), 0};
+}
+
+/// Passes cycles within the loop, up to the first boundary of instructions at or after `cycles`.
+std::uint64_t FastCore::skip(avr_t& avr, std::uint64_t cycles) {
+  const std::vector<std::uint8_t>& to_boundary = waiting_.loop->to_boundary;
+  const auto phase = static_cast<std::uint32_t>((waiting_.phase + cycles) % to_boundary.size());
+  const std::uint64_t passed = cycles + to_boundary[phase];
+  waiting_.phase = static_cast<std::uint32_t>((phase + to_boundary[phase]) % to_boundary.size());
+  avr.cycle += passed;
+  return passed;
+}
+
+void FastCore::settle(avr_t& avr) {
+  if (!waiting_.loop) return;
+  const Waiting was = std::exchange(waiting_, Waiting());
+  // The I/O registers as the loop saw them.
+  std::array<std::uint8_t, kRam> present;
+  std::memcpy(present.data(), avr.data, present.size());
+  std::memcpy(avr.data, was.loop->begin.data.data(), present.size());
+  const std::uint64_t cycle = avr.cycle;
+  execute<false>(avr, was.phase);
+  avr.cycle = cycle;
+  std::memcpy(avr.data + kRegisters, present.data() + kRegisters, kSpl - kRegisters);
+  std::memcpy(avr.data + kSreg + 1, present.data() + kSreg + 1, kRam - kSreg - 1);
+  forget_anchor();
+}
+
+void FastCore::interrupt(avr_t& avr) {
+  settle(avr);
+  forget_anchor();
+}
+
+void FastCore::rewind() {
+  waiting_ = marked_;
+  forget_anchor();
+}
+
+/// As run(), without skipping. With kSeeksLoops it ends where it finds a loop.
+template <bool kSeeksLoops> std::uint64_t FastCore::execute(avr_t& avr, std::uint64_t cycles) {
   std::uint8_t* const data = avr.data;
   std::uint8_t* const flag = avr.sreg;
   Operation* const operations = operations_->data();
@@ -411,6 +527,17 @@ std::uint64_t FastCore::run(avr_t& avr, std::uint64_t cycles) {
         set_pair(o.r, address);
         took = 2;
         break;
+      }
+      case kPoll: {
+        // Nothing changes until the cycles are over. The operations below execute what does not fit.
+        constexpr std::uint32_t kRound = 5;
+        const std::uint64_t rounds = (cycles - passed) / kRound;
+        if (rounds > 0 && (data[o.k] >> (o.r & 7) & 1) == o.r >> 3) {
+          data[o.d] = data[o.k];
+          passed += kRound * rounds;
+          continue;
+        }
+        [[fallthrough]];
       }
       case kLds:
         data[o.d] = data[o.k];
@@ -577,8 +704,14 @@ std::uint64_t FastCore::run(avr_t& avr, std::uint64_t cycles) {
       }
       default: goto libsimavrs;
     }
+    const bool jumps_back = next <= pc;
     pc = next;
     passed += took;
+    if (kSeeksLoops && jumps_back && is_back(avr, pc, avr.cycle + passed)) {
+      avr.pc = pc;
+      enter_loop(avr, static_cast<std::uint32_t>(avr.cycle + passed - anchor_.cycle));
+      break;
+    }
   }
 libsimavrs:
   avr.pc = pc;

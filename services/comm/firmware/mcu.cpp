@@ -107,7 +107,6 @@ Mcu::Mcu(const FlashImage& image, const std::array<std::uint8_t, kEepromOctets>&
     std::copy(program_.begin(), program_.end(), avr_->flash + at);
   std::fill_n(avr_->flash + kProgramSpace, 4, std::uint8_t{0xff});
   avr_->flashend = avr_->codeend = kProgramSpace - 1;
-  if (core == Core::kFast) core_ = std::make_unique<FastCore>(avr_->flash);
   auto* const data = static_cast<std::uint8_t*>(std::calloc(kDataSpace, 1));
   std::copy_n(avr_->data, avr_->ramend + 1u, data);
   std::free(avr_->data);
@@ -145,6 +144,7 @@ Mcu::Mcu(const FlashImage& image, const std::array<std::uint8_t, kEepromOctets>&
   avr_irq_register_notify(avr_io_getirq(avr_, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), on_serial, this);
   for (const Register one : {kDdrB, kDdrD, kTccr2a, kOcr2a, kOcr2b})
     avr_irq_register_notify(avr_iomem_getirq(avr_, one, nullptr, AVR_IOMEM_IRQ_ALL), on_motor, this);
+  if (core == Core::kFast) core_ = std::make_unique<FastCore>(*avr_);
   after_reset();
 
   for (int i = 0; i < avr_->irq_pool.count; ++i) {
@@ -181,6 +181,7 @@ void Mcu::set_readings(const senses::Readings& readings) {
 }
 
 void Mcu::power_off() {
+  interrupt_core();
   avr_->state = cpu_Done;
   state_.halt = Halt::kFlat;
   state_.dark_at = kNever;
@@ -191,9 +192,7 @@ void Mcu::power_on() {
   state.powered_down = now();
   state.conversions = state_.conversions;
   std::array<std::uint8_t, kEepromOctets> kept = eeprom();
-  marked_ = pristine_;
-  replaced_.clear();
-  rewind();
+  return_to_pristine();
   state_ = state;
   avr_eeprom_desc_t description{kept.data(), 0, kEepromOctets};
   avr_ioctl(avr_, AVR_IOCTL_EEPROM_SET, &description);
@@ -250,6 +249,7 @@ void Mcu::execute(OwnCycles until) {
 /// run_cycle_limit stays 1.
 void Mcu::run_burst(OwnCycles budget) {
   if (avr_->run != avr_callback_run_raw) {  // the watchdog resets it
+    interrupt_core();
     avr_->run(avr_);
     return after_reset();
   }
@@ -263,7 +263,10 @@ void Mcu::run_burst(OwnCycles budget) {
     at = avr_->pc;
   }
   avr_->run_cycle_count = cycles;
-  if (cycles > 0) at = avr_run_one(avr_);
+  if (cycles > 0) {
+    interrupt_core();
+    at = avr_run_one(avr_);
+  }
   if (avr_->state == cpu_Crashed) {
     if (state_.halt == Halt::kNone) {  // it ran out of the flash
       state_.halt = Halt::kBadAddress;
@@ -276,8 +279,19 @@ void Mcu::run_burst(OwnCycles budget) {
   serve_interrupts();
 }
 
+/// Registers and RAM are about to change by something else than the core.
+void Mcu::interrupt_core() {
+  if (core_) core_->interrupt(*avr_);
+}
+
+/// Brings registers and RAM up to date.
+void Mcu::settle() const {
+  if (core_) core_->settle(*avr_);
+}
+
 void Mcu::serve_interrupts() {
   if (avr_->interrupt_state == 0) return;
+  interrupt_core();
   const avr_flashaddr_t before = avr_->pc;
   avr_service_interrupts(avr_);
   if (avr_->pc != before && (avr_->data[kMcucr] & kIvsel) != 0) avr_->pc += kBootSection;
@@ -336,10 +350,15 @@ bool Mcu::listening() const {
 }
 
 std::uint32_t Mcu::program_counter() const {
-  return state_.fault_at != 0 ? state_.fault_at % kFlashOctets : avr_->pc;
+  if (state_.fault_at != 0) return state_.fault_at % kFlashOctets;
+  settle();
+  return avr_->pc;
 }
 
-std::uint8_t Mcu::memory(std::uint16_t address) const { return avr_->data[address]; }
+std::uint8_t Mcu::memory(std::uint16_t address) const {
+  settle();
+  return avr_->data[address];
+}
 
 std::array<std::uint8_t, kEepromOctets> Mcu::eeprom() const {
   std::array<std::uint8_t, kEepromOctets> octets{};

@@ -141,6 +141,9 @@ class Mcu {
   void power_down(OwnCycles until);
   void doze(OwnCycles until);
   void serve_interrupts();
+  void interrupt_core();
+  void settle() const;
+  void return_to_pristine();
   void after_reset();
   void hold_charger();
   void set_receiver(bool lit);

@@ -104,6 +104,7 @@ void Mcu::mark() {
     at += kLine;
   }
   marked_state_ = state_;
+  if (core_) core_->mark();
   replaced_.clear();
 }
 
@@ -119,11 +120,22 @@ void Mcu::rewind() {
     at += kLine;
   }
   state_ = marked_state_;
+  if (core_) core_->rewind();
   for (const Page& page : replaced_) put_page(page.address, page.octets.data());
   replaced_.clear();
 }
 
+/// The state at cycle 0, but for what libsimavr does not hold.
+void Mcu::return_to_pristine() {
+  interrupt_core();
+  mark();
+  marked_ = pristine_;
+  rewind();
+  state_ = State();
+}
+
 std::string Mcu::save() const {
+  settle();
   std::string octets;
   append(octets, fingerprint());
   append(octets, state_.dark_at);
@@ -184,9 +196,7 @@ void Mcu::load(const std::string& octets) {
     throw RunError(
         "the checkpoint's firmware robots were saved by another build of this program; resume with that one");
   }
-  marked_ = pristine_;
-  replaced_.clear();
-  rewind();
+  return_to_pristine();
   state_.dark_at = reader.next<OwnCycles>();
   state_.powered_down = reader.next<OwnCycles>();
   state_.conversions = reader.next<std::uint32_t>();

@@ -81,7 +81,7 @@ class FastCoreTest : public testing::Test {
 TEST_F(FastCoreTest, EachInstructionLeavesTheSameState) {
   constexpr std::uint32_t kPlace = 0x1000;
   int executed = 0;
-  FastCore core(fast_->flash);
+  FastCore core(*fast_);
   for (std::uint32_t opcode = 0; opcode < 0x10000; ++opcode) {
     for (int round = 0; round < 6; ++round) {
       randomise();
@@ -111,7 +111,7 @@ TEST_F(FastCoreTest, DelaysTakeTheSameCycles) {
       put(kPlace, 0x9701);      // sbiw r24, 1
       put(kPlace + 2, 0xf7f1);  // brne back to it
       put(kPlace + 4, 0xcfff);  // rjmp to itself
-      FastCore core(fast_->flash);
+      FastCore core(*fast_);
       for (avr_t* avr : {&*fast_, &*slow_}) {
         avr->data[24] = static_cast<std::uint8_t>(count);
         avr->data[25] = static_cast<std::uint8_t>(count >> 8);
@@ -126,10 +126,33 @@ TEST_F(FastCoreTest, DelaysTakeTheSameCycles) {
   }
 }
 
+TEST_F(FastCoreTest, PollsTakeTheSameCycles) {
+  constexpr std::uint32_t kPlace = 0x200, kPolled = 0x7a;
+  for (const std::uint32_t skips : {0xfd86u, 0xff86u, 0xfd96u}) {  // sbrc r24, 6; sbrs r24, 6; sbrc r25, 6
+    for (const std::uint64_t budget : {1u, 2u, 3u, 4u, 5u, 6u, 10u, 11u, 2047u}) {
+      randomise();
+      put(kPlace, 0x9180);  // lds r24
+      put(kPlace + 2, kPolled);
+      put(kPlace + 4, skips);
+      put(kPlace + 6, 0xcffc);  // rjmp back
+      put(kPlace + 8, 0xcfff);  // rjmp to itself
+      FastCore core(*fast_);
+      for (avr_t* avr : {&*fast_, &*slow_}) {
+        avr->data[kPolled] = 0x40;
+        avr->pc = kPlace;
+      }
+      core.run(*fast_, budget);
+      slow_->run_cycle_count = budget;
+      expect_equal(skips, avr_run_one(&*slow_));
+      if (HasFatalFailure()) return;
+    }
+  }
+}
+
 TEST_F(FastCoreTest, ForgetsPagesThatAreWritten) {
   put(0x400, 0xe001);  // ldi r16, 1
   put(0x402, 0x9478);  // sei: libsimavr's
-  FastCore core(fast_->flash);
+  FastCore core(*fast_);
   fast_->pc = 0x400;
   fast_->interrupt_state = 0;
   EXPECT_EQ(core.run(*fast_, 100), 1u);

@@ -118,6 +118,57 @@ TEST(Mcu, TheFastCoreGivesWhatLibsimavrGives) {
   }
 }
 
+/// Programs that wait are only counted, not executed: at any cycle they are nevertheless where libsimavr has them. Here nobody
+/// looks at their memory for many spans, and some spans are repeated with other light.
+TEST(Mcu, ProgramsThatWaitAreWhereLibsimavrHasThem) {
+  const std::string rx =
+      "static volatile uint8_t heard; static volatile uint32_t sum; static void setup(void) {}\n"
+      "static void receive(message_t* m, distance_measurement_t* d) { heard = m->data[0] + 1; }\n";
+  const FlashImage programs[] = {
+      firmware(whole_program(rx + "static void loop(void) { if (kilo_ticks / 15 % 3 == heard % 3) set_color(1); }",
+                             "kilo_message_rx = receive;")),
+      firmware(whole_program(rx + "static void loop(void) { while (!heard); set_color(heard); heard = 0; ++sum; }",
+                             "kilo_message_rx = receive;")),
+      firmware(whole_program(rx + "static void loop(void) { sum += get_ambientlight(); set_color(sum >> 4); }",
+                             "kilo_message_rx = receive;")),
+      firmware("#include <avr/io.h>\n" +
+               whole_program(
+                   rx + "static void loop(void) { ADMUX = 0x47; ADCSRA = 0xc7; uint8_t first, second;\n"
+                        "  do { first = ADCSRA; second = ADCSRA; } while (first & second & 0x40); sum += ADC; }",
+                   "kilo_message_rx = receive;"))};
+  senses::Readings readings{};
+  readings.light = 300;
+  readings.light_sd = 4;
+  for (const FlashImage& program : programs) {
+    const auto eeprom = make_eeprom(5, kDuties, kNominal);
+    Mcu fast(program, eeprom, Random(1), 5), slow(program, eeprom, Random(1), 5, Mcu::Core::kLibsimavr);
+    fast.set_readings(readings);
+    slow.set_readings(readings);
+    std::mt19937 random(9);
+    for (int span = 0; span < 2000; ++span) {
+      std::vector<Light> pulses;
+      if (span == 20) pulses = light(kRun, fast.now() + 500);
+      if (span > 100 && span % 60 == 0)
+        pulses = light(0, fast.now() + random() % 2000, 600, 400, static_cast<std::uint8_t>(span));
+      const OwnCycles until = fast.now() + (pulses.empty() ? 1 + random() % 4096 : 60'000);
+      fast.mark();
+      if (span % 3 == 0) {
+        fast.run(until, span % 6 == 0 ? light(0, fast.now() + random() % 900) : std::vector<Light>());
+        fast.rewind();
+      }
+      fast.run(until, pulses);
+      slow.run(until, pulses);
+      ASSERT_EQ(fast.now(), slow.now()) << span;
+      if (span % 25 != 0) continue;
+      ASSERT_EQ(fast.program_counter(), slow.program_counter()) << span;
+      for (int address = 0; address < 0x900; ++address)
+        ASSERT_EQ(fast.memory(static_cast<std::uint16_t>(address)),
+                  slow.memory(static_cast<std::uint16_t>(address)))
+            << span << " at " << address;
+    }
+  }
+}
+
 TEST(PulseDecoder, APacketWithAWrongCrcIsWholeAndSaysSo) {
   IrMessage message{};
   message[3] = 0xa5;
