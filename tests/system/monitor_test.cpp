@@ -16,6 +16,7 @@
 #include "clients/doors/tracked_frame.hpp"
 #include "core/csv/csv_reader.hpp"
 #include "core/federation/topics.hpp"
+#include "tests/system/own_domain.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::test {
@@ -156,9 +157,7 @@ class Player {
 
 class MonitoredRun : public testing::Test {
  protected:
-  MonitoredRun() : domain_(dds::DomainClaim::any().domain()), participant_({domain_, {}}) {
-    write(scratch_ / "wander.c", kProgram);
-  }
+  MonitoredRun() { write(scratch_ / "wander.c", kProgram); }
 
   /// Plays the other experiment with `faults` into a hybrid run; returns the alarms of its summary.
   Json alarms_of(const std::string& faults, Shift knock = {}) {
@@ -186,9 +185,9 @@ class MonitoredRun : public testing::Test {
   /// Runs the hybrid run at a pace. Returns whether player and run kept it.
   bool watch(const std::vector<std::vector<Pose>>& frames, Shift knock, double pace, Json& summary) {
     std::filesystem::remove_all(scratch_ / "run");
-    const Player player(participant_, frames, knock, pace);
+    const Player player(domain_.participant, frames, knock, pace);
     Process process({program(), "run", scratch_ / "watched.txtpb", "--pace", std::to_string(pace), "--duration",
-                     std::to_string(kDuration_s), "--domain", std::to_string(domain_), "--out", scratch_ / "run",
+                     std::to_string(kDuration_s), "--domain", domain_.name, "--out", scratch_ / "run",
                      "--quiet", "--monitor"},
                     scratch_.path());
     const Outcome outcome = process.wait(200);
@@ -219,8 +218,7 @@ class MonitoredRun : public testing::Test {
   }
 
   Scratch scratch_;
-  std::uint32_t domain_;
-  dds::Participant participant_;
+  const OwnDomain domain_;
   std::string printed_;
 };
 
