@@ -57,11 +57,6 @@ struct Tally {
   long sightings = 0, losses = 0, swaps = 0, leds = 0, led_wrong = 0, frames = 0;
 };
 
-/// The class of the last picture alone.
-track::Led last_led(const track::Track& track) {
-  return track.leds[static_cast<std::size_t>(track.led_count - 1) % track.leds.size()];
-}
-
 class Judge {
  public:
   void look(const std::vector<Seen>& truth, double period_s, const track::PictureTracker& tracker) {
@@ -98,7 +93,7 @@ class Judge {
     ++tally.sightings;
     tally.square_mm += off_mm * off_mm;
     ++tally.leds;
-    tally.led_wrong += track::bits_of(last_led(*mine)) != truth.led ? 1 : 0;
+    tally.led_wrong += track::bits_of(*mine->led_read) != truth.led ? 1 : 0;
     const bool was_anothers = std::any_of(robots_.begin(), robots_.end(), [&](const Robot& other) {
       return &other != &robot && other.track == mine->id;
     });

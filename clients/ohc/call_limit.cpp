@@ -1,10 +1,12 @@
 #include "clients/ohc/call_limit.hpp"
 
+#include <fmt/format.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <csignal>
+#include <string>
 
-#include "core/base/error.hpp"
 #include "core/os/files.hpp"
 
 namespace kilotwin::ohc {
@@ -17,6 +19,15 @@ timespec time_of(std::chrono::milliseconds time) {
   return {static_cast<time_t>(time.count() / 1000), static_cast<long>(time.count() % 1000) * 1'000'000};
 }
 
+void say_once(const std::string& reason) {
+  static std::atomic_flag said;
+  if (said.test_and_set()) return;
+  fmt::print(stderr,
+             "kilotwin: no timer for the serial port ({}): if the adapter gets stuck, this program waits for it "
+             "without an end\n",
+             reason);
+}
+
 }  // namespace
 
 CallLimit::CallLimit(std::chrono::milliseconds limit) {
@@ -27,12 +38,18 @@ CallLimit::CallLimit(std::chrono::milliseconds limit) {
   event.sigev_notify = SIGEV_THREAD_ID;
   event.sigev_signo = SIGRTMIN;
   event._sigev_un._tid = gettid();
-  if (timer_create(CLOCK_MONOTONIC, &event, &timer_) != 0)
-    throw RunError("no timer for the serial port: " + os::system_reason());
+  timer_t timer{};
+  if (timer_create(CLOCK_MONOTONIC, &event, &timer) != 0) {
+    say_once(os::system_reason());
+    return;
+  }
+  timer_ = timer;
   const itimerspec times{{0, kAgain_ns}, time_of(limit)};
-  timer_settime(timer_, 0, &times, nullptr);
+  timer_settime(timer, 0, &times, nullptr);
 }
 
-CallLimit::~CallLimit() { timer_delete(timer_); }
+CallLimit::~CallLimit() {
+  if (timer_) timer_delete(*timer_);
+}
 
 }  // namespace kilotwin::ohc

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <ctime>
+#include <optional>
 
 namespace kilotwin::ohc {
 
@@ -10,14 +11,14 @@ namespace kilotwin::ohc {
 /// began. Other threads are not touched.
 class CallLimit {
  public:
-  /// Throws RunError where the system has no timer left.
+  /// Where the system has no timer left, there is no limit. The first time, a line on standard error says so.
   explicit CallLimit(std::chrono::milliseconds limit);
   ~CallLimit();
   CallLimit(const CallLimit&) = delete;
   CallLimit& operator=(const CallLimit&) = delete;
 
  private:
-  timer_t timer_{};
+  std::optional<timer_t> timer_;
 };
 
 }  // namespace kilotwin::ohc

@@ -22,12 +22,6 @@ constexpr double kMostHeld = 0.1;
 /// No robot is faster.
 constexpr double kTopSpeed_mm_s = 35;
 
-Led most_frequent(const std::array<Led, 5>& leds, int count) {
-  std::array<int, 8> votes{};
-  for (int i = 0; i < count; ++i) ++votes[static_cast<std::size_t>(leds[static_cast<std::size_t>(i)])];
-  return static_cast<Led>(std::max_element(votes.begin(), votes.end()) - votes.begin());
-}
-
 }  // namespace
 
 Follower::Follower(FollowLimits limits) : limits_(limits) {}
@@ -49,9 +43,8 @@ void Follower::take(Track& track, std::size_t index, const Sighting& sighting) {
   track.sighting = index;
   track.seen_s = time_s_;
   track.state = track.doubt ? TrackState::kDoubt : TrackState::kSeen;
-  track.leds[static_cast<std::size_t>(track.led_count % 5)] = sighting.led;
-  ++track.led_count;
-  track.led = most_frequent(track.leds, std::min(track.led_count, 5));
+  if (sighting.led_clear || track.led_read.value_or(sighting.led) == sighting.led) track.led = sighting.led;
+  track.led_read = sighting.led;
   track.path.add(time_s_, sighting.x_mm, sighting.y_mm);
   const double sd_mm = std::sqrt(0.5 * (sighting.error.xx + sighting.error.yy));
   if (const auto shown = shown_heading(track, sighting))

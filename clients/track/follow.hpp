@@ -1,7 +1,6 @@
 /// Follower: from the robots of single frames to tracks over time. Knows no pictures; lengths are mm, y points up.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -22,6 +21,7 @@ struct Sighting {
   Led led = Led::kOff;
   std::optional<double> led_bearing_rad;  ///< from the centre, anticlockwise from x
   std::optional<BodyPicture> body{};      ///< where the LED is dark
+  bool led_clear = false;                 ///< LedReading::clear
 };
 
 /// As in TrackerFrame of idl/public.idl.
@@ -35,15 +35,14 @@ struct Track {
   PositionFilter position;
   HeadingFilter heading_filter;
   std::optional<std::size_t> sighting;  ///< of the last frame, where it was seen in it
-  Led led = Led::kOff;                  ///< the most frequent of the last readings
+  Led led = Led::kOff;                  ///< the last class that was clear, or was read twice in sequence
   double seen_s = 0;                    ///< when it was seen last
   bool doubt = false;                   ///< it may have exchanged its identity with another track
   bool confirmed = false;
 
   // What only the follower uses.
   StraightPath path;
-  std::array<Led, 5> leds{};
-  int led_count = 0;
+  std::optional<Led> led_read{};  ///< of the last picture
   int frames = 0, hits = 0;  ///< while it is not confirmed
 };
 

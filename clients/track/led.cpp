@@ -20,6 +20,8 @@ constexpr double kRimFrom = 0.72, kRimTo = 0.95, kBrightRim = 0.8;
 constexpr double kLeastLight = 0.10;
 /// A second channel with this share of the strongest one belongs to the colour.
 constexpr double kMixed = 0.5;
+/// A class is clear below this share of the second channel; and above, or below, these multiples of the least light.
+constexpr double kPure = 0.3, kClearlyLit = 2, kClearlyDark = 0.5;
 /// Where even the weakest one has this share, the light is white.
 constexpr double kGrey = 0.7;
 /// The floor is looked at no farther from the centre than this, radii, and places so close to another robot's centre are no floor.
@@ -221,7 +223,12 @@ void remove(Light& light, const Circle& disc, const Spot& spot) {
   }
 }
 
-Led classify(const Light& light, const Circle& disc, const Spot& spot) {
+struct Hue {
+  Led led = Led::kWhite;
+  bool pure = false;  ///< one channel alone
+};
+
+Hue classify(const Light& light, const Circle& disc, const Spot& spot) {
   // The colour is in the glow, at most two windows wide, and counts where the channels differ.
   const double reach = 2 * std::max(1.2, kSpot * disc.radius_px);
   Colour pure{};
@@ -242,15 +249,16 @@ Led classify(const Light& light, const Circle& disc, const Spot& spot) {
     }
   }
   const auto [dimmest, strongest] = std::minmax({pure[0], pure[1], pure[2]});
-  if (strongest <= 0 || strongest < 0.35 * white || dimmest > kGrey * strongest) return Led::kWhite;
+  if (strongest <= 0 || strongest < 0.35 * white || dimmest > kGrey * strongest) return {};
   // The saturated middle leaves white in the sum.
   for (double& channel : pure) channel -= dimmest;
   const double most = strongest - dimmest;
   const bool red = pure[0] > kMixed * most, green = pure[1] > kMixed * most, blue = pure[2] > kMixed * most;
-  if (red && green) return Led::kYellow;
-  if (red && blue) return Led::kMagenta;
-  if (green && blue) return Led::kCyan;
-  return red ? Led::kRed : green ? Led::kGreen : Led::kBlue;
+  if (red && green) return {Led::kYellow};
+  if (red && blue) return {Led::kMagenta};
+  if (green && blue) return {Led::kCyan};
+  const double second = pure[0] + pure[1] + pure[2] - most;  // the weakest is 0
+  return {red ? Led::kRed : green ? Led::kGreen : Led::kBlue, second < kPure * most};
 }
 
 }  // namespace
@@ -293,8 +301,13 @@ LedReading read_led(const cv::Mat& picture, const Circle& disc, const std::vecto
   }
   LedReading reading;
   reading.strength = spot.strength;
-  if (spot.strength < kLeastLight) return reading;
-  reading.led = classify(light, disc, spot);
+  if (spot.strength < kLeastLight) {
+    reading.clear = spot.strength < kClearlyDark * kLeastLight;
+    return reading;
+  }
+  const Hue hue = classify(light, disc, spot);
+  reading.led = hue.led;
+  reading.clear = hue.pure && spot.strength > kClearlyLit * kLeastLight;
   const double dx = light.left + spot.x * light.stride - disc.centre.x_px,
                dy = light.top + spot.y * light.stride - disc.centre.y_px;
   if (std::hypot(dx, dy) > 0.4 * disc.radius_px) reading.bearing_rad = std::atan2(-dy, dx);

@@ -100,6 +100,7 @@ Sighting PictureTracker::sighting_of(const cv::Mat& picture, const cv::Mat& grey
   const FloorPoint at = floor_->floor(detection.disc.centre);
   Sighting sighting{at.x_mm, at.y_mm, floor_->covariance(detection.disc.centre, detection.error_px2), led.led,
                     std::nullopt};
+  sighting.led_clear = led.clear;
   if (led.bearing_rad) sighting.led_bearing_rad = floor_->floor_direction(detection.disc.centre, *led.bearing_rad);
   if (led.led == Led::kOff) sighting.body = BodyPicture::of(grey, detection.disc.centre, *floor_);
   return sighting;

@@ -136,16 +136,10 @@ Qos make_qos(const Channel& channel) {
       // When one writer leaves, others of the same key keep their instance.
       dds_qset_writer_data_lifecycle(qos.get(), false);
       break;
-    case Delivery::kMetrics:
-      dds_qset_history(qos.get(), DDS_HISTORY_KEEP_ALL, 0);
-      dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
-      dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, 1, DDS_LENGTH_UNLIMITED,
-                                  DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
-      break;
     case Delivery::kLog:
       dds_qset_history(qos.get(), DDS_HISTORY_KEEP_ALL, 0);
       dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
-      dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_ALL, -1, DDS_LENGTH_UNLIMITED,
+      dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, 1, DDS_LENGTH_UNLIMITED,
                                   DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
       break;
     case Delivery::kStatus:

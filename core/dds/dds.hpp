@@ -48,8 +48,7 @@ inline constexpr double kAnnounceEvery_s = 2.0;
 enum class Delivery {
   kFrame,       ///< reliable, keep-last 8 per publisher, volatile: tick topics
   kMembership,  ///< reliable, keep-last 1, transient-local: members. An instance lives while any writer of it does
-  kMetrics,     ///< reliable, keep-all; late readers get the last sample that others have read
-  kLog,         ///< reliable, keep-all, transient-local: late readers get all samples
+  kLog,         ///< reliable, keep-all: readers get all samples from their match on, and before these the last one
   kStatus,      ///< reliable, keep-last 1, transient-local
   kRequest,     ///< reliable, keep-last 16, volatile: requests of outsiders
   kTelemetry,   ///< best effort, keep-last 1, volatile

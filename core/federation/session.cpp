@@ -268,6 +268,8 @@ std::string Session::likely_cause() const {
 }
 
 bool Session::hears_all() const {
+  // Of directives that are written before a reader is matched, the reader would get the last one alone.
+  if (directive_writer_ && directive_writer_->readers() + 1 < plan_.federates()) return false;
   return std::all_of(inputs_.begin(), inputs_.end(), [](InputBase* input) { return input->gate().heard_all(); });
 }
 

@@ -99,7 +99,8 @@ class Session {
   [[nodiscard]] bool expects_frames() const { return phase_ != kilotwin_wire_ARRIVING; }  ///< with the mutex held
   void mention(std::uint64_t directives) { schedule_.mention(directives); }               ///< with the mutex held
   void fail(const std::string& line);                                                     ///< with the mutex held
-  /// Publishes a directive of the ingress. Only the station calls it, on the session's thread.
+  /// Publishes a directive of the ingress. Only the station calls it, on the session's thread, and not before the first tick:
+  /// until then a federate may not be there yet.
   void announce(const Directive& directive);
 
  private:

@@ -48,7 +48,7 @@ inline Channel overhead() { return {"kilotwin/overhead", Delivery::kFrame, ""}; 
 
 inline Channel members() { return {"kilotwin/members", Delivery::kMembership, ""}; }
 inline Channel directives() { return {"kilotwin/directives", Delivery::kLog, ""}; }
-inline Channel metrics() { return {"kilotwin/metrics", Delivery::kMetrics, ""}; }
+inline Channel metrics() { return {"kilotwin/metrics", Delivery::kLog, ""}; }
 
 inline Channel run_control() { return {"kilotwin/run_control", Delivery::kRequest, ""}; }
 inline Channel relocations() { return {"kilotwin/relocations", Delivery::kRequest, ""}; }

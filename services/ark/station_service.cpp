@@ -222,7 +222,9 @@ class StationFederate : public Federate {
       saved_ = written_;
   }
 
+  /// What comes before the first tick waits for it.
   void announce(Tick now) {
+    if (!session_.started()) return;
     for (const Directive& directive : external_input_.take()) announce(now, directive);
     if (interrupted() != 0 && !stop_announced_) {
       stop_announced_ = true;
@@ -230,7 +232,7 @@ class StationFederate : public Federate {
       stop.kind = DirectiveKind::kStop;
       announce(now, stop);
     }
-    if (session_.started() && !session_.paused() && snapshots_.due(Clock::now())) {
+    if (!session_.paused() && snapshots_.due(Clock::now())) {
       Directive save;
       save.kind = DirectiveKind::kCheckpoint;
       snapshots_.taken(announce(now, save));

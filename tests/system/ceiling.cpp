@@ -4,8 +4,6 @@
 
 #include <algorithm>
 
-#include "core/dds/dds.hpp"
-
 namespace kilotwin::test {
 
 std::string Ceiling::size() const { return fmt::format("{}x{}", width_px, height_px); }
@@ -22,11 +20,6 @@ std::string Ceiling::calibration() const {
     text += fmt::format("corner{}: [ {:.6f}, {:.6f} ]\n", corner + 1, x, y);
   }
   return text;
-}
-
-std::pair<std::string, std::string> two_domains() {
-  const dds::DomainClaim one = dds::DomainClaim::any(), other = dds::DomainClaim::any();
-  return {std::to_string(one.domain()), std::to_string(other.domain())};
 }
 
 }  // namespace kilotwin::test

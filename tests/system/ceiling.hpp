@@ -2,7 +2,6 @@
 #pragma once
 
 #include <string>
-#include <utility>
 
 namespace kilotwin::test {
 
@@ -17,8 +16,5 @@ struct Ceiling {
   /// For `track --calibration`: where the arena's corners appear in the picture.
   [[nodiscard]] std::string calibration() const;
 };
-
-/// Two domains that were free; the runs claim them.
-[[nodiscard]] std::pair<std::string, std::string> two_domains();
 
 }  // namespace kilotwin::test

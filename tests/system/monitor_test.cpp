@@ -16,6 +16,7 @@
 #include "clients/doors/tracked_frame.hpp"
 #include "core/csv/csv_reader.hpp"
 #include "core/federation/topics.hpp"
+#include "tests/system/own_domain.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::test {
@@ -24,7 +25,7 @@ namespace {
 using Json = nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kPace = 4, kFrames_per_s = 30, kDuration_s = 100;
+constexpr double kFrames_per_s = 30, kDuration_s = 70;
 constexpr std::uint32_t kRobots = 6;
 
 /// Robots of both experiments: two rows that drive to the right, turning a little to and fro.
@@ -41,7 +42,7 @@ int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }
 constexpr const char* kArena =
     "arena { width_mm: 2400 height_mm: 1200 } radio { oscillator_sd: 0 }\n"
     "motion { bias_sd_mm_s: 0.05 factor_variance_s: 0.0005 spin_up_s: 0 }\n";
-constexpr const char* kLayout = "layout { x_mm: -600 grid { pitch_mm: 150 heading: HEADING_FIXED } }";
+constexpr const char* kLayout = "layout { x_mm: -450 grid { pitch_mm: 150 heading: HEADING_FIXED } }";
 
 struct Shift {
   double from_s = 1e9, x_mm = 0, y_mm = 0;
@@ -70,9 +71,10 @@ std::vector<std::vector<Pose>> frames_of(const std::filesystem::path& table) {
 /// Publishes the frames at the pace of the run, which it learns from the run's status.
 class Player {
  public:
-  Player(const dds::Participant& participant, std::vector<std::vector<Pose>> frames, Shift knock)
-      : frames_(std::move(frames)),
+  Player(const dds::Participant& participant, const std::vector<std::vector<Pose>>& frames, Shift knock, double pace)
+      : frames_(frames),
         knock_(knock),
+        pace_(pace),
         writer_(participant, "other arena"),
         status_(participant, topics::run_status(), [this](const PublicRunStatus& sample, dds::SampleState state) {
           if (state.valid && sample.phase == kilotwin_open_RUNNING) hear(sample.wall_s);
@@ -83,6 +85,8 @@ class Player {
     thread_.request_stop();
     wake_.notify_all();
   }
+  /// Whether it wrote every frame that it owed within a moment of its time.
+  [[nodiscard]] bool in_time() const { return skipped_ == 0; }
 
  private:
   /// The earliest begin that the samples of the status allow: the least delay counts.
@@ -101,10 +105,15 @@ class Player {
     const Clock::time_point begin = begin_;
     const auto due = [&](std::size_t frame) {
       return begin + std::chrono::duration_cast<Clock::duration>(
-                         std::chrono::duration<double>(static_cast<double>(frame) / kFrames_per_s / kPace));
+                         std::chrono::duration<double>(static_cast<double>(frame) / kFrames_per_s / pace_));
     };
     for (std::size_t frame = 0; frame < frames_.size() && !stop.stop_requested(); ++frame) {
-      if (due(frame) < Clock::now() - std::chrono::milliseconds(50)) continue;
+      if (due(frame) < Clock::now() - std::chrono::milliseconds(50)) {
+        // Those before the first one are of the time in which the run's begin was learned.
+        if (written_) ++skipped_;
+        continue;
+      }
+      written_ = true;
       wake_.wait_until(lock, stop, due(frame), [] { return false; });
       write(frame, due(frame).time_since_epoch());
     }
@@ -131,8 +140,11 @@ class Player {
     writer_.write(sample);
   }
 
-  std::vector<std::vector<Pose>> frames_;
+  const std::vector<std::vector<Pose>>& frames_;
   const Shift knock_;
+  const double pace_;
+  std::atomic<int> skipped_{0};
+  bool written_ = false;
   doors::FrameWriter writer_;
   std::mt19937_64 random_{3};
   std::mutex mutex_;
@@ -145,9 +157,7 @@ class Player {
 
 class MonitoredRun : public testing::Test {
  protected:
-  MonitoredRun() : domain_(dds::DomainClaim::any().domain()), participant_({domain_, {}}) {
-    write(scratch_ / "wander.c", kProgram);
-  }
+  MonitoredRun() { write(scratch_ / "wander.c", kProgram); }
 
   /// Plays the other experiment with `faults` into a hybrid run; returns the alarms of its summary.
   Json alarms_of(const std::string& faults, Shift knock = {}) {
@@ -159,23 +169,37 @@ class MonitoredRun : public testing::Test {
     run({"run", scratch_ / "other.txtpb", "--mode", "local", "--duration", std::to_string(kDuration_s), "--out",
          scratch_ / "other", "--set", "recording.every_s=0.033333333"});
     run({"export", scratch_ / "other", "--trajectories", scratch_ / "other.csv", "--every", "0.033333333"});
-    Outcome outcome;
-    {
-      const Player player(participant_, frames_of(scratch_ / "other.csv"), knock);
-      Process process({program(), "run", scratch_ / "watched.txtpb", "--pace", std::to_string(kPace), "--duration",
-                       std::to_string(kDuration_s), "--domain", std::to_string(domain_), "--out", scratch_ / "run",
-                       "--quiet", "--monitor"},
-                      scratch_.path());
-      outcome = process.wait(200);
+    const std::vector<std::vector<Pose>> frames = frames_of(scratch_ / "other.csv");
+    Json summary;
+    // On a busy machine frames come late or not at all, and that is not what these tests are of: again, slower.
+    for (const double pace : {6.0, 3.0, 1.5, 0.75}) {
+      if (watch(frames, knock, pace, summary)) break;
     }
-    EXPECT_EQ(outcome.status, 0) << outcome.err;
-    printed_ = outcome.err;
-    const Json summary = Json::parse(read(scratch_ / "run/summary.json"));
     const Json& monitor = summary.at("monitor");
     EXPECT_EQ(monitor.at("robots_watched"), kRobots);
-    EXPECT_GT(monitor.at("measurements").get<int>(), 5000);
+    EXPECT_GT(monitor.at("measurements").get<int>(), 3500);
     RecordProperty("innovation_variance", monitor.at("innovation_variance").dump());
     return monitor.at("alarms");
+  }
+
+  /// Runs the hybrid run at a pace. Returns whether player and run kept it.
+  bool watch(const std::vector<std::vector<Pose>>& frames, Shift knock, double pace, Json& summary) {
+    std::filesystem::remove_all(scratch_ / "run");
+    const Player player(domain_.participant, frames, knock, pace);
+    Process process({program(), "run", scratch_ / "watched.txtpb", "--pace", std::to_string(pace), "--duration",
+                     std::to_string(kDuration_s), "--domain", domain_.name, "--out", scratch_ / "run",
+                     "--quiet", "--monitor"},
+                    scratch_.path());
+    const Outcome outcome = process.wait(200);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    printed_ = outcome.err;
+    summary = Json::parse(read(scratch_ / "run/summary.json"));
+    // A robot that drives at 10 mm/s is off by 0.5 mm in this time, as much as by the noise.
+    constexpr double kMostLate_s = 0.05;
+    const double late_s = 1e-3 * pace * summary.at("worst_lateness_ms").get<double>();
+    const bool kept = player.in_time() && late_s < kMostLate_s && summary.at("tracking").at("lost") == 0;
+    std::printf("pace %.2f: %s, late by %.3f simulated s at most\n", pace, kept ? "kept" : "not kept", late_s);
+    return kept;
   }
 
   void run(const Words& words) {
@@ -194,8 +218,7 @@ class MonitoredRun : public testing::Test {
   }
 
   Scratch scratch_;
-  std::uint32_t domain_;
-  dds::Participant participant_;
+  const OwnDomain domain_;
   std::string printed_;
 };
 
@@ -208,27 +231,27 @@ const Json* alarm_with(const Json& alarms, const std::string& suspect) {
 
 TEST_F(MonitoredRun, AMotorThatFailsAndNothingElseIsAnAlarm) {
   const Json alarms = alarms_of(
-      "effect { name: \"failed\" acts_on: WHEEL_GAIN wheel: LEFT_WHEEL robot: 2 function { of: TIME steps { at: 70 "
+      "effect { name: \"failed\" acts_on: WHEEL_GAIN wheel: LEFT_WHEEL robot: 2 function { of: TIME steps { at: 45 "
       "value: 0 value: -1 } } }");
   ASSERT_FALSE(alarms.empty());
   const Json& first = alarms[0];
   EXPECT_EQ(first.at("suspect"), "gain_left") << alarms.dump(1);
   EXPECT_EQ(first.at("robots"), Json::array({2}));
   const double time_s = first.at("time_s");
-  EXPECT_GT(time_s, 70);
-  EXPECT_LT(time_s, 80);
+  EXPECT_GT(time_s, 45);
+  EXPECT_LT(time_s, 55);
   EXPECT_NE(printed_.find("robot 2 leaves the model: gain of the left wheel"), std::string::npos) << printed_;
   for (const Json& alarm : alarms) EXPECT_EQ(alarm.at("robots"), Json::array({2})) << alarms.dump(1);
   expect_the_same_of_the_recording();
 }
 
 TEST_F(MonitoredRun, AKnockedCameraIsOneAlarmOfItsTracker) {
-  const Json alarms = alarms_of("", {75, 6, -4});
+  const Json alarms = alarms_of("", {50, 6, -4});
   ASSERT_EQ(alarms.size(), 1u) << alarms.dump(1);
   EXPECT_EQ(alarms[0].at("suspect"), "calibration_shift") << alarms.dump(1);
   EXPECT_EQ(alarms[0].at("tracker"), "other arena");
-  EXPECT_GT(alarms[0].at("time_s").get<double>(), 75);
-  EXPECT_LT(alarms[0].at("time_s").get<double>(), 78);
+  EXPECT_GT(alarms[0].at("time_s").get<double>(), 50);
+  EXPECT_LT(alarms[0].at("time_s").get<double>(), 53);
   expect_the_same_of_the_recording();
 }
 

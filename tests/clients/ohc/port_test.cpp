@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/ioctl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <termios.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
@@ -163,6 +165,23 @@ TEST(CallLimit, EndsACallThatWouldNotReturn) {
   EXPECT_EQ(read(ends[0], &octet, 1), 1) << "afterwards calls are as before";
   close(ends[0]);
   close(ends[1]);
+}
+
+TEST(CallLimit, IsNoneWhereTheSystemHasNoTimerLeft) {
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_SIGPENDING, &before), 0);
+  rlimit none = before;
+  none.rlim_cur = 0;  // each timer needs room for its signal
+  ASSERT_EQ(setrlimit(RLIMIT_SIGPENDING, &none), 0);
+  testing::internal::CaptureStderr();
+  {
+    const CallLimit limit(std::chrono::milliseconds(30));
+    const CallLimit another(std::chrono::milliseconds(30));
+  }
+  const std::string said = testing::internal::GetCapturedStderr();
+  ASSERT_EQ(setrlimit(RLIMIT_SIGPENDING, &before), 0);
+  EXPECT_NE(said.find("no timer for the serial port"), std::string::npos) << said;
+  EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << "said once";
 }
 
 TEST(SerialPort, GivesAStalledAdapterUpAndSaysSo) {

@@ -104,6 +104,25 @@ TEST(Follow, TwoRobotsThatVanishTogetherAndComeBackNearAreInDoubt) {
   EXPECT_EQ(track_of(follower, 0)->state, TrackState::kSeen);
 }
 
+TEST(LedOfATrack, ChangesAtOnceToAClearClassAndElseWithTheSecondPicture) {
+  Follower follower;
+  int frame = 0;
+  const auto see = [&](Led led, bool clear) {
+    Sighting sighting = at(0, 0);
+    sighting.led = led;
+    sighting.led_clear = clear;
+    follower.predict(frame++ / 30.0);
+    follower.update({sighting});
+    return follower.tracks().front().led;
+  };
+  EXPECT_EQ(see(Led::kRed, false), Led::kRed) << "there is nothing else yet";
+  EXPECT_EQ(see(Led::kYellow, false), Led::kRed) << "a picture exposed while the light turned from red to green";
+  EXPECT_EQ(see(Led::kGreen, true), Led::kGreen);
+  EXPECT_EQ(see(Led::kCyan, false), Led::kGreen);
+  EXPECT_EQ(see(Led::kCyan, false), Led::kCyan);
+  EXPECT_EQ(see(Led::kOff, true), Led::kOff);
+}
+
 TEST(LedDirection, IsLearnedFromStraightPaths) {
   LedBearing bearing;
   EXPECT_FALSE(bearing.mount());

@@ -13,6 +13,7 @@
 
 #include "clients/recorder/reader.hpp"
 #include "tests/system/ceiling.hpp"
+#include "tests/system/own_domain.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::test {
@@ -70,7 +71,8 @@ proto::StateRecord last_state(const std::string& recording) {
 
 TEST(TrackerLive, RobotsOfAnotherWorldGetTheirNumbersByTheStationsIdentification) {
   const Scratch scratch;
-  const auto [here, there] = two_domains();
+  const OwnDomain own_here, own_there;
+  const std::string &here = own_here.name, &there = own_there.name;
   write(scratch / "world.txtpb", world());
   write(scratch / "tracked.txtpb", tracked());
   write(scratch / "ceiling.yaml", kCeiling.calibration());
