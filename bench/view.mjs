@@ -1,5 +1,5 @@
 #!/usr/bin/env node
-// What the web page of a run costs and does: frames per second, bytes per viewer, viewers beside a run, recordings.
+// Measures the web page of a run: frames per second, bytes per viewer, viewers beside a run, recordings.
 // Usage: bench/view.mjs [-w] [-n ROUNDS] [-k BUILD]     default: 5 rounds, build/release
 //   -w  write the tables to docs/results/view.md
 // Needs a build with tests, Chromium, and the npm packages of scripts/setup --develop. Rounds alternate between the conditions
@@ -309,7 +309,7 @@ function recordingCost() {
   const bytes = fs.statSync(path.join(out, "recording.ktrec")).size / robots / minutes;
   const ns = (summary.cost_ns_per_robot_tick.recording * summary.ticks) / minutes;
   const all = Object.values(summary.cost_ns_per_robot_tick).reduce((sum, cost) => sum + cost, 0);
-  say("\n## What recording costs\n");
+  say("\n## Cost of recording\n");
   say(`${robots} robots, ${duration} s, a state per second, in one process. Per robot and simulated minute:\n`);
   say("| bytes | CPU time | share of the run's CPU time | load |\n|---|---|---|---|");
   say(`| ${bytes.toFixed(0)} | ${(ns / 1000).toFixed(1)} us | ${((100 * summary.cost_ns_per_robot_tick.recording) / all).toFixed(2)} % | ${load()} |`);

@@ -39,7 +39,7 @@ void handle(int signal, siginfo_t* info, void* context) {
   RobotThread& thread = robot_thread;
   const bool was_sent = info->si_code <= 0;  // a process sent it; the kernel's faults have positive codes
   if (was_sent && info->si_pid != getpid()) {
-    if (auto* const told = before_sent_signal.load()) told();
+    if (auto* const before = before_sent_signal.load()) before();
   }
   if (was_sent || thread.leave == 0) return pass_on(signal, was_sent);
   ucontext_t& interrupted = *static_cast<ucontext_t*>(context);

@@ -13,18 +13,24 @@
 #include "services/behaviours/faults.hpp"
 
 namespace kilotwin::behaviours {
+
+/// The content of the file.
+struct Note {
+  BehavioursEngine::Running running;
+  std::atomic<std::uint32_t> signal_was_sent{0};  ///< 1 from the first signal of another process on
+};
+
 namespace {
 
-using Running = BehavioursEngine::Running;
 static_assert(std::atomic<std::uint32_t>::is_always_lock_free && std::atomic<std::int64_t>::is_always_lock_free);
 
 /// All notes of this process, for the signal handler.
-std::array<std::atomic<Running*>, 64> noted{};
+std::array<std::atomic<Note*>, 64> noted{};
 
-/// Clears all notes, because a signal from another process is not caused by a robot.
-void clear_notes() {
+/// Marks all notes. Other threads may still enter further robots before the process ends, so the robots' fields would not do.
+void mark_notes() {
   for (const auto& place : noted) {
-    if (Running* const running = place.load()) running->robot.store(BehavioursEngine::kNobody);
+    if (Note* const note = place.load()) note->signal_was_sent.store(1);
   }
 }
 
@@ -38,38 +44,43 @@ RunningNote::RunningNote(const std::filesystem::path& run_directory, HostId host
     : path_(note_of(run_directory, host)) {
   const int file = open(path_.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   void* mapped = MAP_FAILED;
-  if (file >= 0 && ftruncate(file, sizeof(Running)) == 0)
-    mapped = mmap(nullptr, sizeof(Running), PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
+  if (file >= 0 && ftruncate(file, sizeof(Note)) == 0)
+    mapped = mmap(nullptr, sizeof(Note), PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
   if (file >= 0) close(file);
   if (mapped == MAP_FAILED) throw RunError(path_.string() + ": cannot be written; is the disk full?");
-  place_ = new (mapped) Running;
+  note_ = new (mapped) Note;
   for (auto& free : noted) {
-    Running* none = nullptr;
-    if (free.compare_exchange_strong(none, place_)) break;
+    Note* none = nullptr;
+    if (free.compare_exchange_strong(none, note_)) break;
   }
-  before_sent_signal = clear_notes;
+  before_sent_signal = mark_notes;
 }
 
 RunningNote::~RunningNote() {
   for (auto& own : noted) {
-    Running* here = place_;
+    Note* here = note_;
     if (own.compare_exchange_strong(here, nullptr)) break;
   }
-  munmap(static_cast<void*>(place_), sizeof(Running));
+  munmap(static_cast<void*>(note_), sizeof(Note));
   unlink(path_.c_str());
 }
+
+BehavioursEngine::Running& RunningNote::place() { return note_->running; }
 
 std::optional<Culprit> take_note(const std::filesystem::path& run_directory, HostId host) {
   const std::filesystem::path path = note_of(run_directory, host);
   const auto octets = os::read_if_there(path);
   unlink(path.c_str());
-  if (!octets || octets->size() != sizeof(Running)) return std::nullopt;
+  if (!octets || octets->size() != sizeof(Note)) return std::nullopt;
+  const auto copy = [&](auto& to, std::size_t offset) { std::memcpy(&to, octets->data() + offset, sizeof to); };
   Culprit culprit;
   std::int64_t tick = 0;
-  std::memcpy(&culprit.robot, octets->data() + offsetof(Running, robot), sizeof culprit.robot);
-  std::memcpy(&tick, octets->data() + offsetof(Running, tick), sizeof tick);
+  std::uint32_t signal_was_sent = 0;
+  copy(culprit.robot, offsetof(Note, running.robot));
+  copy(tick, offsetof(Note, running.tick));
+  copy(signal_was_sent, offsetof(Note, signal_was_sent));
   culprit.tick = Tick{tick};
-  if (culprit.robot == BehavioursEngine::kNobody) return std::nullopt;
+  if (signal_was_sent != 0 || culprit.robot == BehavioursEngine::kNobody) return std::nullopt;
   return culprit;
 }
 

@@ -1,4 +1,5 @@
 /// A file in the run directory with the robot whose program a host is running. After a crash of the host it identifies the cause.
+/// If another process sends a signal that ends the host, the file says so, and no robot is the cause.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +10,8 @@
 
 namespace kilotwin::behaviours {
 
+struct Note;
+
 /// The host maps the file and writes to it while this object exists. The destructor removes the file.
 class RunningNote {
  public:
@@ -16,11 +19,11 @@ class RunningNote {
   RunningNote(const std::filesystem::path& run_directory, HostId host);
   ~RunningNote();
   RunningNote(const RunningNote&) = delete;
-  [[nodiscard]] BehavioursEngine::Running& place() { return *place_; }
+  [[nodiscard]] BehavioursEngine::Running& place();
 
  private:
   std::filesystem::path path_;
-  BehavioursEngine::Running* place_ = nullptr;
+  Note* note_ = nullptr;
 };
 
 struct Culprit {

@@ -3,32 +3,55 @@
 
 #include <gtest/gtest.h>
 #include <sched.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <numeric>
 #include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
 
+namespace {
+
+/// The calling thread's calls of sched_yield().
+thread_local std::atomic<int> yields_of_thread{0};
+
+}  // namespace
+
+/// Takes the place of the C library's function in this program.
+extern "C" int sched_yield() noexcept {
+  ++yields_of_thread;
+  return static_cast<int>(syscall(SYS_sched_yield));
+}
+
 namespace kilotwin::os {
 namespace {
+
+/// Calls `what` on a thread that may use one processor only.
+void on_one_core(const std::function<void()>& what) {
+  std::thread([&] {
+    cpu_set_t cores;
+    ASSERT_EQ(sched_getaffinity(0, sizeof cores, &cores), 0);
+    std::size_t processor = 0;
+    while (!CPU_ISSET(processor, &cores)) ++processor;
+    CPU_ZERO(&cores);
+    CPU_SET(processor, &cores);
+    ASSERT_EQ(sched_setaffinity(0, sizeof cores, &cores), 0);
+    what();
+  }).join();
+}
 
 TEST(Cores, AreThoseThatTheThreadMayUse) {
   cpu_set_t all;
   ASSERT_EQ(sched_getaffinity(0, sizeof all, &all), 0);
   EXPECT_EQ(cores(), static_cast<std::uint32_t>(CPU_COUNT(&all)));
-  std::thread([&] {
-    std::size_t processor = 0;
-    while (!CPU_ISSET(processor, &all)) ++processor;
-    cpu_set_t one;
-    CPU_ZERO(&one);
-    CPU_SET(processor, &one);
-    ASSERT_EQ(sched_setaffinity(0, sizeof one, &one), 0);
-    EXPECT_EQ(cores(), 1u);
-  }).join();
+  on_one_core([] { EXPECT_EQ(cores(), 1u); });
 }
 
 TEST(WorkerPool, RunsEachTaskOnceOnAnyNumberOfThreads) {
@@ -103,6 +126,32 @@ TEST(WorkerPool, SkipsTasksAfterAFailure) {
   };
   EXPECT_THROW(pool.for_each(1000, task), int);
   EXPECT_LE(calls, 2) << "no more than one for each thread";
+}
+
+/// How often the calling thread of a pool of two yields while it waits for the other thread. That thread waits in its task until
+/// the caller has yielded `wanted` times, at most about `patience_ms`.
+int yields_while_waiting(int wanted, int patience_ms) {
+  WorkerPool pool(2);
+  const auto caller = std::this_thread::get_id();
+  const std::atomic<int>& yields = yields_of_thread;
+  const int before = yields;
+  std::atomic<int> begun{0};
+  const auto pause = [] { std::this_thread::sleep_for(std::chrono::milliseconds(1)); };
+  pool.for_each(2, [&](std::size_t) {
+    for (++begun; begun < 2;) pause();  // each thread takes one task
+    if (std::this_thread::get_id() == caller) return;
+    for (int ms = 0; ms < patience_ms && yields < before + wanted; ++ms) pause();
+  });
+  return yields - before;
+}
+
+TEST(WorkerPool, ThreadsThatOutnumberTheCoresYield) {
+  // The library's wait, which follows, yields four times itself. The pool's eight times come before.
+  static constexpr int kOurs = 8;
+  on_one_core([] { EXPECT_GE(yields_while_waiting(kOurs, 10'000), kOurs); });
+  if (cores() >= 2) {
+    EXPECT_LT(yields_while_waiting(kOurs, 50), kOurs) << "threads with a core each spin";
+  }
 }
 
 TEST(InParallel, RethrowsExceptionsAndMayBeNested) {

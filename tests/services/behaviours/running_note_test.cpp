@@ -7,6 +7,7 @@
 
 #include <csignal>
 
+#include "services/behaviours/faults.hpp"
 #include "tests/services/behaviours/swarm.hpp"
 
 namespace kilotwin::behaviours::test {
@@ -47,6 +48,21 @@ TEST(RunningNote, ASignalFromAnotherProcessNamesNoRobot) {
     ASSERT_EQ(waitpid(process, &status, 0), process);
     EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == signal) << status;
     EXPECT_FALSE(take_note(swarm.folder.path(), HostId{0}).has_value()) << "signal " << signal;
+  }
+}
+
+TEST(RunningNote, NamesNoRobotThatAnotherThreadEntersAfterTheSignal) {
+  const Folder folder;
+  for (const bool sent : {false, true}) {
+    RunningNote note(folder.path(), HostId{0});
+    note.place().robot = 3;
+    if (sent) before_sent_signal.load()();
+    note.place().robot = 4;
+    const auto culprit = take_note(folder.path(), HostId{0});
+    ASSERT_EQ(culprit.has_value(), !sent);
+    if (culprit) {
+      EXPECT_EQ(culprit->robot, 4u);
+    }
   }
 }
 
