@@ -71,6 +71,7 @@ std::string bars(const std::vector<Bar>& bars, double longest) {
     one.set("kind", bar.kind);
     one.set("percent", fmt::format("{:.1f}", std::clamp(100 * bar.length / longest, 0.0, 100.0)));
     one.set("value", bar.value);
+    if (!bar.interval.empty()) one.set("interval", bar.interval);
     list << one;
   }
   all.set("bars", list);

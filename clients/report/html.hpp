@@ -45,7 +45,8 @@ struct Bar {
   std::string what;
   std::string kind;   ///< its colour: "before", "after" or "floor"
   double length = 0;  ///< from 0
-  std::string value;  ///< markup
+  std::string value;
+  std::string interval = {};  ///< of the value; empty: none
 };
 /// Horizontal bars. `longest`: the length that fills the width; without a positive one there are no bars.
 [[nodiscard]] std::string bars(const std::vector<Bar>& bars, double longest);

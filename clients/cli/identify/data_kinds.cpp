@@ -12,6 +12,7 @@
 #include "clients/cli/identify/trajectory_data.hpp"
 #include "clients/identify/bristle/identify_bristle.hpp"
 #include "clients/identify/data/import.hpp"
+#include "clients/identify/kilogrid/floor_protocol.hpp"
 #include "clients/identify/kilogrid/identify_floor.hpp"
 #include "core/base/error.hpp"
 
@@ -65,7 +66,9 @@ identify::Identified identify_floor_data(const fs::path& train, const fs::path& 
                                          const identify::Options& options) {
   std::vector<kilogrid::FloorRun> held_out;
   if (!test.empty()) held_out = kilogrid::read_floor_runs(test);
-  return kilogrid::identify_floor(kilogrid::read_floor_runs(train), std::move(held_out), options);
+  // Beside the days that are reported.
+  const fs::path ledger = (test.empty() ? train : test) / kilogrid::OpenedDays::kFile;
+  return kilogrid::identify_floor(kilogrid::read_floor_runs(train), std::move(held_out), options, ledger);
 }
 
 identify::Identified identify_bristle_data(const fs::path& train, const fs::path& test, const fs::path&,

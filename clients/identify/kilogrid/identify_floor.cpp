@@ -1,12 +1,18 @@
 #include "clients/identify/kilogrid/identify_floor.hpp"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
+#include <iterator>
+#include <utility>
 
 #include "clients/identify/kilogrid/floor_plots.hpp"
+#include "clients/identify/kilogrid/floor_protocol.hpp"
 #include "clients/identify/kilogrid/floor_search.hpp"
 #include "clients/identify/kilogrid/floor_validation.hpp"
 #include "clients/identify/result/values.hpp"
@@ -45,6 +51,12 @@ FloorModel without(const FloorModel& model, std::size_t effect) {
 std::size_t effects_of(const FloorModel& model) { return model.terms.size() - 1 + (model.wall ? 1 : 0); }
 std::string name_of(const FloorModel& model, std::size_t effect) {
   return effect + 1 < model.terms.size() ? model.terms[effect + 1].name : kWallEffect;
+}
+
+std::vector<std::string> names_of(const FloorModel& model) {
+  std::vector<std::string> names;
+  for (std::size_t e = 0; e < effects_of(model); ++e) names.push_back(name_of(model, e));
+  return names;
 }
 
 std::vector<std::string> covariates_of(const FloorModel& model, std::size_t effect) {
@@ -110,19 +122,28 @@ struct JudgedModel {
   double misfit;
 };
 
+/// A model on the path of the search.
+struct FloorStage {
+  std::vector<std::string> effects;
+  FloorModel model;
+};
+
 /// One identification, in the order of its public functions.
 class FloorIdentification {
  public:
-  FloorIdentification(const std::vector<FloorRun>& train, const std::vector<FloorRun>& test, const Options& options)
+  FloorIdentification(FloorDays days, const Options& options)
       : options_(options),
-        test_(test),
-        learned_(without_unlike_runs(train, test), floor_, options.threads),
-        held_out_(test, floor_, options.threads) {}
+        days_(without_unlike_runs(std::move(days))),
+        learned_(days_.fit, floor_, options.threads),
+        choosing_(days_.choose, floor_, options.threads),
+        held_out_(days_.report, floor_, options.threads) {}
 
   void fit_base();
   void search();
-  /// Errors of both models, and of the model without each effect.
-  void judge();
+  /// Chooses among the models of the search by the days that choose, and refits the chosen one to these days too.
+  void choose();
+  /// Errors of both models, and of the model without each effect. From here on the reported days are open.
+  void judge(const OpenedDays&);
   void compare_with_days();
   [[nodiscard]] Identified result();
 
@@ -134,7 +155,11 @@ class FloorIdentification {
   [[nodiscard]] FloorProgress progress() const {
     return [this](const std::string& what) { say(what); };
   }
-  std::vector<FloorRun> without_unlike_runs(const std::vector<FloorRun>& train, const std::vector<FloorRun>& test);
+  FloorDays without_unlike_runs(FloorDays);
+  [[nodiscard]] FloorScore score_of(const FloorModel&) const;
+  void drop(const std::vector<std::string>& kept);
+  void refit();
+  void add_caveats(const OpenedDays::Opened&);
   void note(const std::string& added, const FloorModel& model);
   [[nodiscard]] JudgedModel judged(const FloorModel& model, std::uint64_t seed, std::vector<Predicted>& to) const;
   [[nodiscard]] identification::Effect judged_effect(std::size_t e);
@@ -144,46 +169,61 @@ class FloorIdentification {
   void add_base();
 
   const Options& options_;
-  const std::vector<FloorRun>& test_;
   const Floor floor_;
   identification::Identification found_;
   double part_ = 0;  ///< completed share
-  std::vector<FloorRun> alike_, unlike_;
-  const FloorTarget learned_, held_out_;
+  std::vector<FloorRun> unlike_;
+  const FloorDays days_;
+  const FloorTarget learned_, choosing_, held_out_;
+  std::vector<FloorStage> path_;  ///< of the search, base model first
   FloorModel base_, model_;
   std::vector<EffectGain> gains_;
   std::vector<Predicted> by_base_, by_model_;
   JudgedModel before_ = {}, after_ = {};
 };
 
-/// An unlike day is reported and excluded from the fit: its conditions need not recur.
-std::vector<FloorRun> FloorIdentification::without_unlike_runs(const std::vector<FloorRun>& train,
-                                                               const std::vector<FloorRun>& test) {
-  add_faults(out(), train);
-  add_faults(out(), test);
-  const std::vector<UnlikeRun> unlikes = unlike_runs(train, floor_);
-  for (std::size_t r = 0; r < train.size(); ++r) {
+/// An unlike day is reported, and neither fits nor chooses: its conditions need not recur.
+FloorDays FloorIdentification::without_unlike_runs(FloorDays days) {
+  for (const auto* runs : {&days.fit, &days.report}) add_faults(out(), *runs);
+  if (!days.chose_on_reported) add_faults(out(), days.choose);
+  const std::size_t fitted = days.fit.size();
+  std::vector<FloorRun> all = std::move(days.fit);
+  if (!days.chose_on_reported) std::move(days.choose.begin(), days.choose.end(), std::back_inserter(all));
+  const std::vector<UnlikeRun> unlikes = unlike_runs(all, floor_);
+  std::vector<FloorRun> choose;
+  days.fit.clear();
+  for (std::size_t r = 0; r < all.size(); ++r) {
     const auto is = std::find_if(unlikes.begin(), unlikes.end(), [&](const UnlikeRun& u) { return u.run == r; });
-    (is == unlikes.end() ? alike_ : unlike_).push_back(train[r]);
-    if (is == unlikes.end()) continue;
+    if (is == unlikes.end()) {
+      (r < fitted ? days.fit : choose).push_back(std::move(all[r]));
+      continue;
+    }
     identification::Fault& fault = *out().add_faults();
     fault.set_kind("unlike");
-    fault.set_run(train[r].name);
+    fault.set_run(all[r].name);
     fault.set_in_words(
         fmt::format("{}: the robots behaved differently from those of the other runs ({}: {:.3g} "
                     "against {:.3g}); the run is excluded from the fit",
-                    train[r].name, is->worst, is->value, is->others));
-    say(fmt::format("{} is unlike the other runs", train[r].name));
+                    all[r].name, is->worst, is->value, is->others));
+    say(fmt::format("{} is unlike the other runs", all[r].name));
+    unlike_.push_back(std::move(all[r]));
   }
-  return alike_;
+  if (days.chose_on_reported) return days;
+  days.choose = std::move(choose);
+  // The only day that could choose is unlike the others.
+  days.chose_on_reported = days.choose.empty();
+  if (days.chose_on_reported) days.choose = days.report;
+  return days;
 }
 
+/// On the days that choose: the reported days stay closed during the search.
 void FloorIdentification::note(const std::string& added, const FloorModel& model) {
-  const double misfit = held_out_.misfit(simulated_statistics(held_out_, model.settings(), 4711));
+  const double misfit = choosing_.misfit(simulated_statistics(choosing_, model.settings(), 4711));
   identification::Step& step = *found_.add_steps();
   step.set_added(added);
   step.set_held_out_misfit(misfit);
-  say(fmt::format("{}: misfit on held-out runs {:.0f}, {} statistics", added, misfit, held_out_.size()));
+  path_.push_back({names_of(model), model});
+  say(fmt::format("{}: misfit on the days that choose {:.0f}, {} statistics", added, misfit, choosing_.size()));
 }
 
 void FloorIdentification::fit_base() {
@@ -217,9 +257,69 @@ void FloorIdentification::search() {
   }
 }
 
+FloorScore FloorIdentification::score_of(const FloorModel& model) const {
+  return {choosing_.misfit(simulated_statistics(choosing_, model.settings(), 4712, 2)),
+          validate(days_.choose, floor_, model.settings(), options_.horizon_s, nullptr).rmse_mm()};
+}
+
+void FloorIdentification::choose() {
+  part_ = 0.82;
+  say("last check");
+  if (effects_of(model_) > 0) path_.push_back({names_of(model_), model_});
+  std::vector<FloorScore> scores;
+  for (const FloorStage& stage : path_) {
+    scores.push_back(score_of(stage.model));
+    identification::CheckedModel& checked = *out().mutable_check()->add_path();
+    assign(checked.mutable_effects(), stage.effects);
+    checked.set_rmse_mm(scores.back().rmse_mm);
+    checked.set_misfit(scores.back().misfit);
+  }
+  const std::size_t kept = chosen_model(scores);
+  out().mutable_check()->set_kept(static_cast<std::uint32_t>(kept));
+  const FloorStage stage = path_[kept];
+  drop(stage.effects);
+  model_ = stage.model;
+  say(fmt::format("the days that choose keep {} of {} effects", stage.effects.size(), path_.back().effects.size()));
+  if (!days_.chose_on_reported) refit();
+}
+
+/// Effects of the search that are not written leave the findings, except that they were dropped.
+void FloorIdentification::drop(const std::vector<std::string>& kept) {
+  for (std::size_t e = 0; e < effects_of(model_); ++e) {
+    const std::string name = name_of(model_, e);
+    if (std::find(kept.begin(), kept.end(), name) != kept.end()) continue;
+    out().mutable_check()->add_dropped(name);
+    identification::Rejected& rejected = *out().add_rejected();
+    rejected.set_name(name);
+    assign(rejected.mutable_covariates(), covariates_of(model_, e));
+    rejected.set_acts_on(name == kWallEffect ? "WHEEL_GAIN" : model_.terms[e + 1].acts_on);
+    rejected.set_why("days that took no part in the search are predicted no better with it");
+  }
+  // An effect that the search took out again may be back.
+  std::vector<EffectGain> gains;
+  for (const std::string& name : kept) {
+    const auto known =
+        std::find_if(gains_.begin(), gains_.end(), [&](const EffectGain& gain) { return gain.name == name; });
+    gains.push_back(known == gains_.end() ? EffectGain{name, 0, 0} : *known);
+  }
+  gains_ = std::move(gains);
+}
+
+/// The days that choose are days of the fit once they have chosen.
+void FloorIdentification::refit() {
+  std::vector<FloorRun> all = days_.fit;
+  all.insert(all.end(), days_.choose.begin(), days_.choose.end());
+  const FloorTarget target(all, floor_, options_.threads);
+  fit(base_, target, 1, 0.5, 400, progress());
+  if (effects_of(model_) > 0)
+    fit(model_, target, 1, 0.5, 400, progress());
+  else
+    model_ = base_;
+}
+
 JudgedModel FloorIdentification::judged(const FloorModel& model, std::uint64_t seed,
                                         std::vector<Predicted>& to) const {
-  JudgedModel out{validate(test_, floor_, model.settings(), options_.horizon_s, &to),
+  JudgedModel out{validate(days_.report, floor_, model.settings(), options_.horizon_s, &to),
                   simulated_statistics(held_out_, model.settings(), seed, 2), 0};
   out.misfit = held_out_.misfit(out.statistics);
   return out;
@@ -243,7 +343,7 @@ identification::Effect FloorIdentification::judged_effect(std::size_t e) {
   const std::string name = name_of(model_, e);
   const bool is_wall = name == kWallEffect;
   const double misfit = held_out_.misfit(simulated_statistics(held_out_, less.settings(), 79));
-  const Validation lesser = validate(test_, floor_, less.settings(), options_.horizon_s, nullptr);
+  const Validation lesser = validate(days_.report, floor_, less.settings(), options_.horizon_s, nullptr);
   const double gain_nat = after_.cells.log_likelihood - lesser.log_likelihood;
   identification::Effect effect;
   effect.set_name(name);
@@ -288,9 +388,47 @@ void FloorIdentification::add_ambiguities() {
         "let robots drive along the wall with the boundary messages switched off");
 }
 
-void FloorIdentification::judge() {
+/// What a reader must know about the errors.
+void FloorIdentification::add_caveats(const OpenedDays::Opened& opened) {
+  std::vector<std::string> sentences;
+  if (days_.chose_on_reported)
+    sentences.emplace_back(
+        "The same days chose the model and give its errors, so that the errors are too small; more days would "
+        "allow "
+        "others to choose.");
+  if (opened.before > 0)
+    sentences.push_back(fmt::format(
+        "The reported days are not unseen: {} other search{} reported on them before ({} beside the data). Only "
+        "new days can confirm this model.",
+        opened.before, opened.before == 1 ? " was" : "es were", OpenedDays::kFile));
+  if (!opened.unwritable.empty())
+    sentences.push_back(fmt::format("That these days were reported could not be noted: {}.", opened.unwritable));
+  if (effects_of(model_) > 0 && !(after_.misfit <= before_.misfit))
+    sentences.push_back(
+        fmt::format("On the reported days the misfit is larger with effects than without ({:.0f}, {:.0f}): they "
+                    "differ from the "
+                    "days of the fit.",
+                    after_.misfit, before_.misfit));
+  if (!sentences.empty()) out().mutable_check()->set_in_words(fmt::format("{}", fmt::join(sentences, " ")));
+  identification::HeldOut& held_out = *out().mutable_held_out();
+  held_out.set_kind("days");
+  held_out.set_opened_before(static_cast<std::uint32_t>(opened.before));
+  std::vector<std::string> reported, choosing;
+  for (const FloorRun& run : days_.report) reported.push_back(run.name);
+  for (const FloorRun& run : days_.choose) choosing.push_back(run.name);
+  held_out.set_in_words(fmt::format("Days that give the errors: {}. Days that chose the model: {}.",
+                                    fmt::join(reported, ", "), fmt::join(choosing, ", ")));
+}
+
+/// The date in UTC: for people who read the record of opened days.
+std::string today() {
+  return fmt::format("{:%Y-%m-%d}", std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now()));
+}
+
+void FloorIdentification::judge(const OpenedDays& ledger) {
   part_ = 0.85;
   say("predictions");
+  const OpenedDays::Opened opened = ledger.open(days_.report, days_.fit, today());
   before_ = judged(base_, 78, by_base_);
   after_ = judged(model_, 79, by_model_);
   for (const auto& [to, of] : {std::pair{out().mutable_before(), &before_}, {out().mutable_after(), &after_}}) {
@@ -305,6 +443,7 @@ void FloorIdentification::judge() {
                    });
   for (identification::Effect& effect : effects) *out().add_effects() = std::move(effect);
   add_ambiguities();
+  add_caveats(opened);
 }
 
 void FloorIdentification::add_statistics() {
@@ -329,7 +468,10 @@ void FloorIdentification::compare_with_days() {
   part_ = 0.95;
   say("classifier");
   add_statistics();
-  *out().mutable_classifier() = classify(alike_, unlike_, test_, held_out_, base_.settings(), model_.settings());
+  std::vector<FloorRun> alike = days_.fit;
+  if (!days_.chose_on_reported) alike.insert(alike.end(), days_.choose.begin(), days_.choose.end());
+  *out().mutable_classifier() =
+      classify(alike, unlike_, days_.report, held_out_, base_.settings(), model_.settings());
   *found_.add_tables() = table_of_motion(held_out_, before_.statistics, after_.statistics);
   add_words(found_);
   add_plots(found_, held_out_, before_.statistics, after_.statistics);
@@ -358,8 +500,9 @@ Identified FloorIdentification::result() {
   add_base();
   found_.mutable_set()->set_has_headings(false);
   found_.mutable_set()->set_has_commands(false);
-  found_.mutable_set()->set_train(static_cast<std::uint32_t>(alike_.size() + unlike_.size()));
-  found_.mutable_set()->set_test(static_cast<std::uint32_t>(test_.size()));
+  const std::size_t choosing = days_.chose_on_reported ? 0 : days_.choose.size();
+  found_.mutable_set()->set_train(static_cast<std::uint32_t>(days_.fit.size() + choosing + unlike_.size()));
+  found_.mutable_set()->set_test(static_cast<std::uint32_t>(days_.report.size()));
   Identified identified;
   identified.model = settings.model;
   for (std::size_t i = 0; i < std::min(by_base_.size(), by_model_.size()); ++i) {
@@ -372,24 +515,15 @@ Identified FloorIdentification::result() {
   return identified;
 }
 
-/// Holds out every third run of the training set.
-void hold_out(std::vector<FloorRun>& train, std::vector<FloorRun>& test) {
-  std::vector<FloorRun> kept;
-  for (std::size_t r = 0; r < train.size(); ++r)
-    (train.size() > 1 && r % 3 == 1 ? test : kept).push_back(std::move(train[r]));
-  train = std::move(kept);
-}
-
 }  // namespace
 
-Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> test, const Options& options) {
-  if (test.empty()) hold_out(train, test);
-  if (train.empty() || test.empty() || train.front().tracks.empty())
-    throw UserError("one run cannot be held out; give at least two runs, or --test DIR");
-  FloorIdentification identification(train, test, options);
+Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> test, const Options& options,
+                          const std::filesystem::path& ledger) {
+  FloorIdentification identification(divided(std::move(train), std::move(test)), options);
   identification.fit_base();
   if (options.find_effects) identification.search();
-  identification.judge();
+  identification.choose();
+  identification.judge(OpenedDays(ledger));
   identification.compare_with_days();
   return identification.result();
 }

@@ -1,8 +1,9 @@
 /// Identification from Kilogrid runs: the base model is fitted by simulation, then effects are selected one by
-/// one. Validation on held-out runs uses statistics, cell predictions and their likelihood, and a classifier
-/// two-sample test.
+/// one. Days that took no part choose among the models of this search. Other days give the errors, once (floor_protocol.hpp):
+/// statistics, cell predictions and their likelihood, and a classifier two-sample test.
 #pragma once
 
+#include <filesystem>
 #include <vector>
 
 #include "clients/identify/identify.hpp"
@@ -10,8 +11,9 @@
 
 namespace kilotwin::kilogrid {
 
-/// `test` empty: holds out every third run of `train`.
+/// `test` empty: holds out every third run of `train`. `ledger`: where openings of reported days are noted; empty: nowhere.
 [[nodiscard]] identify::Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> test,
-                                                  const identify::Options&);
+                                                  const identify::Options&,
+                                                  const std::filesystem::path& ledger = {});
 
 }  // namespace kilotwin::kilogrid

@@ -1,5 +1,3 @@
-#include "clients/identify/report/report_effects.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,35 +7,33 @@
 #include <utility>
 #include <vector>
 
-#include "clients/report/html.hpp"
-#include "clients/report/templates.hpp"
+#include "clients/identify/report/report_sections.hpp"
 
 namespace kilotwin::identify::report {
 namespace {
 
-using html::escaped;
+using identification::CovariatePlot, identification::Effect;
+using Plots = google::protobuf::RepeatedPtrField<CovariatePlot>;
 
-bool shares_covariate(const json& effect, const std::string& covariate) {
+bool shares_covariate(const Effect& effect, const std::string& covariate) {
   static const std::map<std::string, std::set<std::string>> kOf = {
       {"position", {"x", "y", "radius", "position"}},
       {"motor_time", {"motor_time", "driven_time", "left_motor_time", "right_motor_time"}},
       {"neighbours", {"neighbours", "nearest", "density", "nearest_bearing", "bearing"}},
       {"history", {"previous_command", "last_turn", "place", "history"}}};
-  for (const json& c : part(effect, "covariates")) {
-    const std::string name = c.is_string() ? c.get<std::string>() : "";
+  return std::any_of(effect.covariates().begin(), effect.covariates().end(), [&](const std::string& name) {
     const auto of = kOf.find(name);
-    if (name == covariate || (of != kOf.end() && of->second.contains(covariate))) return true;
-  }
-  return false;
+    return name == covariate || (of != kOf.end() && of->second.contains(covariate));
+  });
 }
 
 /// Sum over a plot's bins of (mean / standard error)^2, and the number of bins.
-std::pair<double, double> pattern_of(const json& plot, const char* when) {
-  const json &mean = part(plot, when), &se = part(plot, "before_se");
+std::pair<double, double> pattern_of(const google::protobuf::RepeatedField<double>& mean,
+                                     const google::protobuf::RepeatedField<double>& se) {
   double sum = 0, bins = 0;
-  for (std::size_t k = 0; mean.is_array() && se.is_array() && k < std::min(mean.size(), se.size()); ++k) {
-    if (!mean[k].is_number() || !se[k].is_number() || !(se[k].get<double>() > 0)) continue;
-    const double z = mean[k].get<double>() / se[k].get<double>();
+  for (int k = 0; k < std::min(mean.size(), se.size()); ++k) {
+    const double z = mean[k] / se[k];
+    if (!(se[k] > 0) || !std::isfinite(z)) continue;
     sum += z * z;
     bins += 1;
   }
@@ -46,13 +42,13 @@ std::pair<double, double> pattern_of(const json& plot, const char* when) {
 
 /// Whether a plot shows the residuals of what an effect acts on. An effect on something that has no plot matches none;
 /// results that do not say what effects act on match all.
-bool shows_target(const json& effect, const json& plot) {
-  const std::string acts_on = acts_on_of(effect), target = text(plot, "target");
+bool shows_target(const Effect& effect, const CovariatePlot& plot) {
   static const std::map<std::string, std::vector<std::string>> kOf = {{"forward", {"speed"}},
                                                                       {"turn", {"turn rate", "measured heading"}},
                                                                       {"world_x", {"drift", "measured position"}},
                                                                       {"world_y", {"drift", "measured position"}}};
-  const auto of = kOf.find(target);
+  const std::string acts_on = acts_on_in_words(effect.acts_on());
+  const auto of = kOf.find(plot.target());
   return acts_on.empty() || of == kOf.end() ||
          std::any_of(of->second.begin(), of->second.end(),
                      [&](const std::string& word) { return acts_on.find(word) != std::string::npos; });
@@ -60,12 +56,12 @@ bool shows_target(const json& effect, const json& plot) {
 
 /// The plot that shows an effect best: over its covariate, of what it acts on, with the largest mean relative to
 /// its standard error.
-const json* plot_for(const json& effect, const json& plots) {
-  const json* best = nullptr;
+const CovariatePlot* plot_for(const Effect& effect, const Plots& plots) {
+  const CovariatePlot* best = nullptr;
   double best_strength = -1;
-  for (const json& plot : plots) {
-    if (!shares_covariate(effect, text(plot, "covariate")) || !shows_target(effect, plot)) continue;
-    const double strength = pattern_of(plot, "before").first;
+  for (const CovariatePlot& plot : plots) {
+    if (!shares_covariate(effect, plot.covariate()) || !shows_target(effect, plot)) continue;
+    const double strength = pattern_of(plot.before(), plot.before_se()).first;
     if (strength <= best_strength) continue;
     best = &plot;
     best_strength = strength;
@@ -73,156 +69,161 @@ const json* plot_for(const json& effect, const json& plots) {
   return best;
 }
 
-}  // namespace
+std::optional<double> log10_p_of(const identification::Evidence& evidence) {
+  if (evidence.has_p_family()) return log10_of(evidence.p_family());
+  return known(evidence.has_log10_p(), evidence.log10_p());
+}
 
-namespace {
-
-/// The facts of an effect. Values are markup.
-html::Data facts_of(const json& effect) {
-  html::Data list{html::Data::type::list};
+Data facts_of(const Effect& effect) {
+  Data list{Data::type::list};
   const auto fact = [&](const std::string& name, const std::string& value) {
-    html::Data one{html::Data::type::object};
+    Data one{Data::type::object};
     one.set("fact", name);
     one.set("value", value);
     list << one;
   };
-  fact("acts on", acts_on_of(effect));
-  if (const json& facts = part(effect, "facts"); facts.is_object()) {
-    for (const auto& [name, value] : facts.items()) fact(name, escaped(value.get<std::string>()));
+  fact("acts on", acts_on_in_words(effect.acts_on()));
+  if (effect.has_facts()) {
+    const std::map<std::string, google::protobuf::Value> given(effect.facts().fields().begin(),
+                                                               effect.facts().fields().end());
+    for (const auto& [name, value] : given) fact(name, value.string_value());
     return list;
   }
-  if (const auto share = number(effect, "share_removed"))
+  if (const auto share = number(effect.share_removed()))
     fact("removes", percent(share) + " of the mean square error");
-  if (const auto without = number(effect, "rmse_without_mm"))
-    fact("without it", "error " + figure(without) + " mm");
-  const json& evidence = part(effect, "evidence");
-  const auto family = number(evidence, "p_family");
-  const auto log10_p = family ? std::log10(std::max(*family, 1e-300)) : number(evidence, "log10_p");
-  if (log10_p) fact("p value", chance(log10_p));
+  if (const auto without = number(effect.rmse_without_mm())) fact("without it", "error " + figure(without) + " mm");
+  if (const auto log10_p = log10_p_of(effect.evidence())) fact("p value", chance(log10_p));
   return list;
 }
 
-/// The fitted maps and curves of an effect, as markup.
-std::string fitted_plots(const json& effect, const json& document, Figures& figures) {
-  std::string plots;
-  const std::string name = text(effect, "name");
-  if (name.empty()) return plots;
-  for (const json& map : part(document, "effect_maps")) {
-    if (text(map, "name") == name)
-      plots += figures.place(plot_effect_map(figures.plots(), map), "The fitted effect");
+/// Adds the fitted maps and curves of an effect. Returns whether there are any.
+bool add_fitted(Data& figures, const Effect& effect, const Identification& found, Figures& drawn) {
+  if (effect.name().empty()) return false;
+  const std::size_t before = drawn.plots().size();
+  for (const identification::EffectMap& map : found.effect_maps()) {
+    if (map.name() == effect.name())
+      drawn.place(figures, plot_effect_map(drawn.plots(), map),
+                  map.low().empty() ? "The fitted effect" : "The fitted effect. Crosses: the 95 % band holds zero");
   }
-  for (const json& curve : part(document, "effect_curves")) {
-    if (text(curve, "name") == name)
-      plots += figures.place(plot_effect(figures.plots(), curve), "The fitted effect");
+  for (const identification::EffectCurve& curve : found.effect_curves()) {
+    if (curve.name() == effect.name())
+      drawn.place(figures, plot_effect(drawn.plots(), curve),
+                  curve.low().empty() ? "The fitted effect" : "The fitted effect with its 95 % band");
   }
-  return plots;
+  return drawn.plots().size() > before;
+}
+
+/// "12.3 ± 4.5".
+std::string with_se(const google::protobuf::Value& value, const google::protobuf::Value& se) {
+  const auto known_value = number(value), known_se = number(se);
+  return known_value && known_se ? figure(known_value) + " ± " + figure(known_se) : figure(known_value);
 }
 
 }  // namespace
 
-std::string cards(const json& contract, const json& document, Figures& figures) {
-  const json& covariate_plots = part(document, "covariate_plots");
-  std::string out;
-  std::set<const json*> shown;
-  for (const json& effect : part(contract, "effects")) {
-    std::string words = text(effect, "in_words");
-    if (words.empty()) words = fmt::format("{} depends on {}.", acts_on_of(effect), covariates_of(effect));
-    std::string plots = fitted_plots(effect, document, figures);
-    const json* plot = covariate_plots.is_array() && plots.empty() ? plot_for(effect, covariate_plots) : nullptr;
-    if (plot != nullptr && shown.insert(plot).second)
-      plots = figures.place(plot_covariate(figures.plots(), *plot), "Residuals without the effect");
-    html::Data card{html::Data::type::object};
-    card.set("depends_on", covariates_of(effect));
-    card.set("words", words);
+Section effects_section(const Identification& found, Figures& drawn) {
+  Data cards{Data::type::list};
+  std::set<const CovariatePlot*> shown;
+  for (const Effect& effect : found.result().effects()) {
+    Data card{Data::type::object}, figures{Data::type::list};
+    const std::string covariates = covariates_of(effect.covariates());
+    if (!add_fitted(figures, effect, found, drawn)) {
+      const CovariatePlot* plot = plot_for(effect, found.covariate_plots());
+      if (plot != nullptr && shown.insert(plot).second)
+        drawn.place(figures, plot_covariate(drawn.plots(), *plot), "Residuals without the effect");
+    }
+    card.set("depends_on", covariates);
+    card.set("words", !effect.in_words().empty()
+                          ? effect.in_words()
+                          : fmt::format("{} depends on {}.", acts_on_in_words(effect.acts_on()), covariates));
     card.set("facts", facts_of(effect));
-    card.set("plots", plots);
-    out += html::rendered(html::templates::kEffect, card);
+    card.set("figures", figures);
+    cards << card;
   }
-  return out;
+  if (cards.is_empty_list()) return std::nullopt;
+  return Data{"cards", cards};
 }
 
-std::string effects_table(const json& contract) {
-  const json& effects = part(contract, "effects");
-  if (!effects.is_array() || effects.empty()) return "";
-  html::Table table({"effect", "depends on", "acts on", "form", "p value", "gain in log-likelihood",
-                     "held-out gain", "error without it, mm", "share of mean square error"});
-  for (const json& effect : effects) {
-    const json& evidence = part(effect, "evidence");
-    const auto held = number(evidence, "held_out_gain"), se = number(evidence, "held_out_gain_se");
-    const auto family = number(evidence, "p_family");
-    table.row({escaped(text(effect, "name")), escaped(covariates_of(effect)), acts_on_of(effect),
-               escaped(text(part(effect, "parameters"), "form")),
-               chance(family ? std::log10(std::max(*family, 1e-300)) : number(evidence, "log10_p")),
-               figure(number(evidence, "log_likelihood_gain")),
-               held ? figure(held) + (se ? " ± " + figure(se) : "") : "–",
-               figure(number(effect, "rmse_without_mm")), percent(number(effect, "share_removed"))});
+Section evidence_section(const Result& result) {
+  if (result.effects().empty()) return std::nullopt;
+  std::vector<std::vector<std::string>> rows;
+  for (const Effect& effect : result.effects()) {
+    const identification::Evidence& evidence = effect.evidence();
+    const auto& parameters = effect.parameters().fields();
+    const auto form = parameters.find("form");
+    rows.push_back({effect.name(), covariates_of(effect.covariates()), acts_on_in_words(effect.acts_on()),
+                    form == parameters.end() ? "" : form->second.string_value(), chance(log10_p_of(evidence)),
+                    figure(known(evidence.has_log_likelihood_gain(), evidence.log_likelihood_gain())),
+                    with_se(evidence.held_out_gain(), evidence.held_out_gain_se()),
+                    figure(number(effect.rmse_without_mm())), percent(number(effect.share_removed()))});
   }
-  return table.text();
+  return Data{"table", table_of({"effect", "depends on", "acts on", "form", "p value", "gain in log-likelihood",
+                                 "held-out gain", "error without it, mm", "share of mean square error"},
+                                rows)};
 }
 
-std::string rejected_table(const json& contract) {
-  const json& rejected = part(contract, "rejected");
-  if (!rejected.is_array() || rejected.empty()) return "";
+Section rejected_section(const Result& result) {
+  const auto& rejected = result.rejected();
+  if (rejected.empty()) return std::nullopt;
   const bool reasons =
-      std::any_of(rejected.begin(), rejected.end(), [](const json& tried) { return !text(tried, "why").empty(); });
+      std::any_of(rejected.begin(), rejected.end(), [](const auto& tried) { return !tried.why().empty(); });
   std::vector<std::string> heads = {"hypothesis", "depends on", "acts on", "p value", "threshold"};
   if (reasons) heads.emplace_back("reason");
-  html::Table table(std::move(heads));
-  for (const json& tried : rejected) {
-    const json& found = part(contract, "effects");
-    const bool more = std::any_of(found.begin(), found.end(), [&](const json& effect) {
-      return !text(effect, "name").empty() && text(effect, "name") == text(tried, "name");
+  std::vector<std::vector<std::string>> rows;
+  for (const identification::Rejected& tried : rejected) {
+    const bool more = std::any_of(result.effects().begin(), result.effects().end(), [&](const Effect& effect) {
+      return !effect.name().empty() && effect.name() == tried.name();
     });
-    std::vector<std::string> cells = {(more ? "further term of " : "") + escaped(text(tried, "name")),
-                                      escaped(covariates_of(tried)), acts_on_of(tried),
-                                      chance(number(tried, "log10_p")), chance(number(tried, "threshold_log10_p"))};
-    if (reasons) cells.push_back(escaped(text(tried, "why")));
-    table.row(cells);
+    rows.push_back({(more ? "further term of " : "") + tried.name(), covariates_of(tried.covariates()),
+                    acts_on_in_words(tried.acts_on()), chance(known(tried.has_log10_p(), tried.log10_p())),
+                    chance(known(tried.has_threshold_log10_p(), tried.threshold_log10_p()))});
+    if (reasons) rows.back().push_back(tried.why());
   }
-  return table.text();
+  return Data{"table", table_of(heads, rows)};
 }
 
-std::string ambiguous_list(const json& contract) {
-  std::string out;
-  for (const json& pair : part(contract, "ambiguous")) {
-    const std::string experiment = text(pair, "experiment");
-    out += fmt::format("<li>Accepted: <b>{}</b>. Alternative: <b>{}</b> (log-likelihood {} lower).{}</li>\n",
-                       escaped(text(pair, "found")), escaped(text(pair, "instead")),
-                       figure(number(pair, "log_likelihood_difference")),
-                       experiment.empty() ? "" : " To separate them: " + escaped(experiment) + ".");
+Section ambiguous_section(const Result& result) {
+  Data pairs{Data::type::list};
+  for (const identification::Ambiguous& pair : result.ambiguous()) {
+    Data one{Data::type::object};
+    one.set("accepted", pair.found());
+    one.set("alternative", pair.instead());
+    one.set("lower", figure(known(pair.has_log_likelihood_difference(), pair.log_likelihood_difference())));
+    set_text(one, "experiment", pair.experiment());
+    pairs << one;
   }
-  return out.empty() ? "" : "<ul>" + out + "</ul>\n";
+  if (pairs.is_empty_list()) return std::nullopt;
+  return Data{"pairs", pairs};
 }
 
-std::string covariate_section(const json& contract, const json& covariate_plots, Figures& figures) {
-  if (!covariate_plots.is_array()) return "";
-  const json& effects = part(contract, "effects");
+Section covariate_section(const Identification& found, Figures& drawn) {
   // Strongest first. Weaker plots show no pattern.
   constexpr double kPattern = 4;
   constexpr std::size_t kMostShown = 8;
-  std::vector<std::pair<double, const json*>> order;
-  for (const json& plot : covariate_plots) {
-    const auto [before, bins] = pattern_of(plot, "before");
-    const double after = pattern_of(plot, "after").first;
+  std::vector<std::pair<double, const CovariatePlot*>> order;
+  const auto& effects = found.result().effects();
+  for (const CovariatePlot& plot : found.covariate_plots()) {
+    const auto [before, bins] = pattern_of(plot.before(), plot.before_se());
+    const double after = pattern_of(plot.after(), plot.before_se()).first;
     if (bins < 2) continue;
-    const bool found = std::any_of(effects.begin(), effects.end(),
-                                   [&](const json& e) { return shares_covariate(e, text(plot, "covariate")); });
-    order.emplace_back(std::max(before, after) / bins * (found ? 10 : 1), &plot);
+    const bool of_effect = std::any_of(effects.begin(), effects.end(),
+                                       [&](const Effect& e) { return shares_covariate(e, plot.covariate()); });
+    order.emplace_back(std::max(before, after) / bins * (of_effect ? 10 : 1), &plot);
   }
   std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
-  std::string shown, folded;
+  Data shown{Data::type::list}, folded{Data::type::list};
   std::size_t count = 0;
   for (const auto& [strength, plot] : order) {
-    const std::string markup = figures.place(plot_covariate(figures.plots(), *plot), "");
-    if (markup.empty()) continue;
+    const PlotNumber number = plot_covariate(drawn.plots(), *plot);
     const bool show = count < kMostShown && (strength > kPattern || count < 2);
-    (show ? shown : folded) += markup;
-    if (show) ++count;
+    drawn.place(show ? shown : folded, number, "");
+    if (show && number) ++count;
   }
-  std::string out = shown.empty() ? "" : "<div class=\"grid\">" + shown + "</div>\n";
-  if (!folded.empty())
-    out += "<details><summary>Other covariates</summary><div class=\"grid\">" + folded + "</div></details>\n";
-  return out;
+  if (shown.is_empty_list() && folded.is_empty_list()) return std::nullopt;
+  Data section{Data::type::object};
+  section.set("figures", shown);
+  if (!folded.is_empty_list()) section.set("folded", Data{"figures", folded});
+  return section;
 }
 
 }  // namespace kilotwin::identify::report

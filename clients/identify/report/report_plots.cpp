@@ -13,8 +13,6 @@
 namespace kilotwin::identify {
 namespace {
 
-using nlohmann::json;
-
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 // Larger values are no measurement and would break the axes.
 constexpr double kAbsurd = 1e12;
@@ -26,25 +24,19 @@ constexpr const char* kMeasuredAndModels =
     "'this model'";
 constexpr const char* kBaseModel = ", $d using 1:4 with lines lt 5 title 'base model'";
 
-std::vector<double> numbers(const json& from, const char* key) {
+double kept(double value) { return std::abs(value) < kAbsurd ? value : kNaN; }
+
+std::vector<double> numbers(const google::protobuf::RepeatedField<double>& values) {
   std::vector<double> out;
-  const auto list = from.find(key);
-  if (list == from.end() || !list->is_array()) return out;
-  for (const json& value : *list) {
-    const double v = value.is_number() ? value.get<double>() : kNaN;
-    out.push_back(std::abs(v) < kAbsurd ? v : kNaN);
-  }
+  for (const double value : values) out.push_back(kept(value));
   return out;
 }
 
-std::string text(const json& from, const char* key) {
-  const auto at = from.find(key);
-  return at != from.end() && at->is_string() ? at->get<std::string>() : "";
-}
-
-double number(const json& from, const char* key) {
-  const auto at = from.find(key);
-  return at != from.end() && at->is_number() ? at->get<double>() : kNaN;
+std::vector<double> numbers(const google::protobuf::ListValue& list) {
+  std::vector<double> out;
+  for (const google::protobuf::Value& value : list.values())
+    out.push_back(value.kind_case() == google::protobuf::Value::kNumberValue ? kept(value.number_value()) : kNaN);
+  return out;
 }
 
 bool any_finite(const std::vector<double>& values) {
@@ -69,36 +61,40 @@ std::string axis(const char* which, const std::string& name, const std::string& 
                      gnuplot_text(unit.empty() ? words_of(name) : words_of(name) + ", " + unit));
 }
 
+using Rows = google::protobuf::RepeatedPtrField<google::protobuf::ListValue>;
+
 /// Values on a grid, [y][x].
 struct Grid {
   std::vector<double> x, y;
   std::vector<std::vector<double>> value;
 
-  bool good() const {
+  template <typename Map> Grid(const Map& map, const Rows& rows) : x(numbers(map.x_mm())), y(numbers(map.y_mm())) {
+    for (const google::protobuf::ListValue& row : rows) value.push_back(numbers(row));
+  }
+  [[nodiscard]] bool good() const {
     if (x.size() < 2 || y.size() < 2 || value.size() != y.size()) return false;
     return std::all_of(value.begin(), value.end(), [&](const auto& row) { return row.size() == x.size(); });
   }
 };
 
-Grid grid_of(const json& map, const char* when) {
-  Grid grid{numbers(map, "x_mm"), numbers(map, "y_mm"), {}};
-  if (!map.contains(when) || !map[when].is_array()) return grid;
-  for (const json& row : map[when]) grid.value.push_back(numbers(json{{"row", row}}, "row"));
-  return grid;
+const Rows& rows_of(const identification::ResidualMap& map, When when) {
+  return when == When::kBefore ? map.before() : map.after();
 }
+const char* name_of(When when) { return when == When::kBefore ? "before" : "after"; }
 
-/// The 98th percentile of the absolute values of all its times.
-double reach(const json& map) {
+/// The 98th percentile of the absolute values.
+double reach(const std::vector<const Rows*>& of) {
   std::vector<double> all;
-  for (const char* when : {"before", "after", "effect"}) {
-    for (const auto& row : grid_of(map, when).value) {
-      for (const double v : row) {
+  for (const Rows* rows : of) {
+    for (const google::protobuf::ListValue& row : *rows) {
+      for (const double v : numbers(row)) {
         if (std::isfinite(v)) all.push_back(std::abs(v));
       }
     }
   }
   return stats::lower_quantile(all, 0.98);
 }
+double reach(const identification::ResidualMap& map) { return reach({&map.before(), &map.after()}); }
 
 /// A round tick interval, about four per length.
 double tick_step(double length) {
@@ -116,6 +112,78 @@ std::string map_frame(const Grid& grid) {
 }
 
 constexpr int kMap_px = 380, kMapHigh_px = 340;
+
+/// x, y and value of the cells with a value.
+std::vector<std::vector<double>> cells_of(const Grid& grid) {
+  std::vector<std::vector<double>> columns(3);
+  for (std::size_t row = 0; row < grid.y.size(); ++row) {
+    for (std::size_t col = 0; col < grid.x.size(); ++col) {
+      if (!std::isfinite(grid.value[row][col])) continue;
+      columns[0].push_back(grid.x[col]);
+      columns[1].push_back(grid.y[row]);
+      columns[2].push_back(grid.value[row][col]);
+    }
+  }
+  return columns;
+}
+
+std::string colours(const std::string& title, double most, const std::string& unit) {
+  return fmt::format(
+      "set title {}\nset cbrange [{}:{}]\nset palette defined (-1 '#2563a8', 0 '#f6f4ef', 1 '#d95f0e')\nset "
+      "cblabel {} offset -0.5,0\n",
+      gnuplot_text(title), -most, most, gnuplot_text(unit));
+}
+
+/// A grid in colours. `marks`: x and y of cells to mark.
+PlotNumber coloured(Gnuplot& plots, const Grid& grid, double most, const std::string& title,
+                    const std::string& unit, const std::vector<std::vector<double>>& marks = {}) {
+  if (!grid.good() || !(most > 0)) return std::nullopt;
+  const std::vector<std::vector<double>> columns = cells_of(grid);
+  if (columns[0].empty()) return std::nullopt;
+  // Slightly wider than the cells, to avoid gaps between them.
+  const double half_x = 0.505 * (grid.x[1] - grid.x[0]), half_y = 0.505 * (grid.y[1] - grid.y[0]);
+  std::string commands = block("d", columns) + map_frame(grid) + colours(title, most, unit);
+  const bool marked = !marks.empty() && !marks[0].empty();
+  if (marked) commands += block("m", marks);
+  commands +=
+      fmt::format("plot $d using 1:2:({}):({}):3 with boxxyerror fs solid 1 noborder fc palette", half_x, half_y);
+  if (marked) commands += ", $m using 1:2 with points pt 2 ps 0.35 lw 0.8 lc rgb '#5a6673'";
+  return plots.add(kMap_px, kMapHigh_px, commands);
+}
+
+/// Values over two covariates in colours.
+PlotNumber plot_table(Gnuplot& plots, const identification::Pattern& pattern, const Rows& rows,
+                      const std::string& title) {
+  const std::vector<double> at = numbers(pattern.at()), and_at = numbers(pattern.and_at());
+  std::vector<std::vector<double>> columns(3);
+  double most = 0;
+  for (std::size_t row = 0; row < std::min(and_at.size(), static_cast<std::size_t>(rows.size())); ++row) {
+    const std::vector<double> values = numbers(rows[static_cast<int>(row)]);
+    for (std::size_t col = 0; col < std::min(at.size(), values.size()); ++col) {
+      if (!std::isfinite(values[col])) continue;
+      columns[0].push_back(static_cast<double>(col));
+      columns[1].push_back(static_cast<double>(row));
+      columns[2].push_back(values[col]);
+      most = std::max(most, std::abs(values[col]));
+    }
+  }
+  if (at.size() < 2 || and_at.size() < 2 || !(most > 0)) return std::nullopt;
+  const auto tics = [](const char* which, const std::vector<double>& values) {
+    std::string out = fmt::format("set {}tics (", which);
+    const std::size_t every = 1 + values.size() / 6;
+    for (std::size_t i = 0; i < values.size(); i += every)
+      out += fmt::format("{}'{:.3g}' {}", i > 0 ? ", " : "", values[i], i);
+    return out + ")\n";
+  };
+  std::string commands = block("d", columns) + tics("x", at) + tics("y", and_at);
+  commands +=
+      axis("x", pattern.covariates(0), pattern.units(0)) + axis("y", pattern.covariates(1), pattern.units(1));
+  commands += fmt::format("unset grid\nunset key\nset xrange [-0.5:{}]\nset yrange [-0.5:{}]\n",
+                          static_cast<double>(at.size()) - 0.5, static_cast<double>(and_at.size()) - 0.5);
+  commands += colours(title, most, "mm");
+  commands += "plot $d using 1:2:(0.505):(0.505):3 with boxxyerror fs solid 1 noborder fc palette";
+  return plots.add(kMap_px, kMapHigh_px, commands);
+}
 
 }  // namespace
 
@@ -167,9 +235,9 @@ std::string words_of(const std::string& name) {
   return plain;
 }
 
-PlotNumber plot_horizon(Gnuplot& plots, const json& horizon) {
-  const std::vector<double> at = numbers(horizon, "at_s"), before = numbers(horizon, "before_mm"),
-                            after = numbers(horizon, "after_mm"), floor = numbers(horizon, "floor_mm");
+PlotNumber plot_horizon(Gnuplot& plots, const identification::Horizon& horizon) {
+  const std::vector<double> at = numbers(horizon.at_s()), before = numbers(horizon.before_mm()),
+                            after = numbers(horizon.after_mm()), floor = numbers(horizon.floor_mm());
   if (at.size() < 2 || !any_finite(before)) return std::nullopt;
   std::string commands = block("d", {at, before, after, floor});
   commands +=
@@ -181,9 +249,9 @@ PlotNumber plot_horizon(Gnuplot& plots, const json& horizon) {
   return plots.add(kHalf_px, kLow_px, commands);
 }
 
-PlotNumber plot_covariate(Gnuplot& plots, const json& plot) {
-  const std::vector<double> at = numbers(plot, "at"), before = numbers(plot, "before"),
-                            se = numbers(plot, "before_se"), after = numbers(plot, "after");
+PlotNumber plot_covariate(Gnuplot& plots, const identification::CovariatePlot& plot) {
+  const std::vector<double> at = numbers(plot.at()), before = numbers(plot.before()),
+                            se = numbers(plot.before_se()), after = numbers(plot.after());
   if (at.size() < 2 || !any_finite(before)) return std::nullopt;
   std::vector<double> low(at.size(), kNaN), high(at.size(), kNaN);
   for (std::size_t k = 0; k < std::min({at.size(), before.size(), se.size()}); ++k) {
@@ -191,8 +259,7 @@ PlotNumber plot_covariate(Gnuplot& plots, const json& plot) {
     high[k] = before[k] + 2 * se[k];
   }
   std::string commands = block("d", {at, before, low, high, after});
-  commands += axis("x", text(plot, "covariate"), text(plot, "unit")) +
-              axis("y", text(plot, "target"), text(plot, "acts_on_unit"));
+  commands += axis("x", plot.covariate(), plot.unit()) + axis("y", plot.target(), plot.acts_on_unit());
   commands +=
       "set xzeroaxis lc rgb '#8896a4'\nset key bottom left horizontal opaque\nset offsets graph 0.02, graph 0.02, "
       "graph 0.12, graph 0.14\n";
@@ -201,8 +268,9 @@ PlotNumber plot_covariate(Gnuplot& plots, const json& plot) {
   return plots.add(kHalf_px, kLow_px, commands);
 }
 
-PlotNumber plot_arrows(Gnuplot& plots, const json& map_x, const json& map_y, const char* when) {
-  const Grid x = grid_of(map_x, when), y = grid_of(map_y, when);
+PlotNumber plot_arrows(Gnuplot& plots, const identification::ResidualMap& map_x,
+                       const identification::ResidualMap& map_y, When when) {
+  const Grid x(map_x, rows_of(map_x, when)), y(map_y, rows_of(map_y, when));
   if (!x.good() || !y.good() || x.x != y.x || x.y != y.y) return std::nullopt;
   const double most = std::max(reach(map_x), reach(map_y));
   if (!(most > 0)) return std::nullopt;
@@ -224,75 +292,35 @@ PlotNumber plot_arrows(Gnuplot& plots, const json& map_x, const json& map_y, con
   commands += fmt::format(
       "set title {}\nset cbrange [0:{}]\nset palette defined (0 '#9fb6cc', 1 '#b3400a')\nset cblabel {} offset "
       "-0.5,0\n",
-      gnuplot_text(when), most, gnuplot_text(text(map_x, "unit")));
+      gnuplot_text(name_of(when)), most, gnuplot_text(map_x.unit()));
   commands += "plot $d using 1:2:3:4:5 with vectors head filled size graph 0.018,20 lw 1.6 lc palette";
   return plots.add(kMap_px, kMapHigh_px, commands);
 }
 
-PlotNumber plot_map(Gnuplot& plots, const json& map, const char* when, const std::string& title) {
-  const Grid grid = grid_of(map, when);
-  const double most = reach(map);
-  if (!grid.good() || !(most > 0)) return std::nullopt;
-  std::vector<std::vector<double>> columns(3);
-  for (std::size_t row = 0; row < grid.y.size(); ++row) {
-    for (std::size_t col = 0; col < grid.x.size(); ++col) {
-      if (!std::isfinite(grid.value[row][col])) continue;
-      columns[0].push_back(grid.x[col]);
-      columns[1].push_back(grid.y[row]);
-      columns[2].push_back(grid.value[row][col]);
-    }
-  }
-  if (columns[0].empty()) return std::nullopt;
-  // Slightly wider than the cells, to avoid gaps between them.
-  const double half_x = 0.505 * (grid.x[1] - grid.x[0]), half_y = 0.505 * (grid.y[1] - grid.y[0]);
-  std::string commands = block("d", columns) + map_frame(grid);
-  commands += fmt::format(
-      "set title {}\nset cbrange [{}:{}]\nset palette defined (-1 '#2563a8', 0 '#f6f4ef', 1 '#d95f0e')\nset "
-      "cblabel {} offset -0.5,0\n",
-      gnuplot_text(title.empty() ? when : title), -most, most, gnuplot_text(text(map, "unit")));
-  commands +=
-      fmt::format("plot $d using 1:2:({}):({}):3 with boxxyerror fs solid 1 noborder fc palette", half_x, half_y);
-  return plots.add(kMap_px, kMapHigh_px, commands);
+PlotNumber plot_map(Gnuplot& plots, const identification::ResidualMap& map, When when) {
+  return coloured(plots, Grid(map, rows_of(map, when)), reach(map), name_of(when), map.unit());
 }
 
-PlotNumber plot_table(Gnuplot& plots, const json& table, const std::string& title) {
-  const std::vector<double> at = numbers(table, "at"), and_at = numbers(table, "and_at");
-  std::vector<std::vector<double>> columns(3);
-  double most = 0;
-  for (std::size_t row = 0; row < and_at.size() && row < table["value"].size(); ++row) {
-    const std::vector<double> values = numbers(json{{"row", table["value"][row]}}, "row");
-    for (std::size_t col = 0; col < std::min(at.size(), values.size()); ++col) {
-      if (!std::isfinite(values[col])) continue;
-      columns[0].push_back(static_cast<double>(col));
-      columns[1].push_back(static_cast<double>(row));
-      columns[2].push_back(values[col]);
-      most = std::max(most, std::abs(values[col]));
-    }
-  }
-  if (at.size() < 2 || and_at.size() < 2 || !(most > 0)) return std::nullopt;
-  const auto tics = [](const char* which, const std::vector<double>& values) {
-    std::string out = fmt::format("set {}tics (", which);
-    const std::size_t every = 1 + values.size() / 6;
-    for (std::size_t i = 0; i < values.size(); i += every)
-      out += fmt::format("{}'{:.3g}' {}", i > 0 ? ", " : "", values[i], i);
-    return out + ")\n";
-  };
-  std::string commands = block("d", columns) + tics("x", at) + tics("y", and_at);
-  for (const auto& [which, index] : {std::pair{"x", 0U}, {"y", 1U}})
-    commands +=
-        axis(which, table["covariates"][index].get<std::string>(), table["units"][index].get<std::string>());
-  commands += fmt::format(
-      "unset grid\nunset key\nset title {}\nset xrange [-0.5:{}]\nset yrange [-0.5:{}]\nset cbrange [{}:{}]\nset "
-      "palette defined (-1 '#2563a8', 0 '#f6f4ef', 1 '#d95f0e')\nset cblabel {} offset -0.5,0\n",
-      gnuplot_text(title), static_cast<double>(at.size()) - 0.5, static_cast<double>(and_at.size()) - 0.5, -most,
-      most, gnuplot_text(text(table, "unit")));
-  commands += "plot $d using 1:2:(0.505):(0.505):3 with boxxyerror fs solid 1 noborder fc palette";
-  return plots.add(kMap_px, kMapHigh_px, commands);
+PlotNumber plot_pattern(Gnuplot& plots, const identification::Pattern& pattern, Component component) {
+  const int which = component == Component::kFirst ? 0 : 1;
+  const Rows& rows = which == 0 ? pattern.first_mm() : pattern.second_mm();
+  if (which >= pattern.components_size() || rows.empty() || pattern.units_size() != pattern.covariates_size())
+    return std::nullopt;
+  const std::string title = "error " + pattern.components(which);
+  if (pattern.covariates_size() != 1) return plot_table(plots, pattern, rows, title);
+  identification::CovariatePlot plot;
+  plot.set_target(title);
+  plot.set_covariate(pattern.covariates(0));
+  plot.set_unit(pattern.units(0));
+  plot.set_acts_on_unit("mm");
+  *plot.mutable_at() = pattern.at();
+  for (const double mean : numbers(rows[0])) plot.add_before(mean);
+  return plot_covariate(plots, plot);
 }
 
-PlotNumber plot_distribution(Gnuplot& plots, const json& distribution) {
-  const std::vector<double> edges = numbers(distribution, "edges"), measured = numbers(distribution, "measured"),
-                            simulated = numbers(distribution, "simulated");
+PlotNumber plot_distribution(Gnuplot& plots, const identification::Distribution& distribution) {
+  const std::vector<double> edges = numbers(distribution.edges()), measured = numbers(distribution.measured()),
+                            simulated = numbers(distribution.simulated());
   if (edges.size() < 3 || measured.size() + 1 != edges.size() || simulated.size() != measured.size())
     return std::nullopt;
   const auto share = [](std::vector<double> counts) {
@@ -306,9 +334,9 @@ PlotNumber plot_distribution(Gnuplot& plots, const json& distribution) {
     middle.push_back(0.5 * (edges[k] + edges[k + 1]));
     width.push_back(edges[k + 1] - edges[k]);
   }
-  const std::vector<double> base = numbers(distribution, "base");
+  const std::vector<double> base = numbers(distribution.base());
   std::string commands = block("d", {middle, share(measured), share(simulated), width, share(base)});
-  commands += axis("x", text(distribution, "name"), text(distribution, "unit"));
+  commands += axis("x", distribution.name(), distribution.unit());
   commands += fmt::format("set ylabel 'share, %'\nset xrange [{}:{}]\nset yrange [0:*]\nset grid noxtics\n",
                           edges.front(), edges.back());
   commands += "plot $d using 1:2:4 with boxes fc rgb '#c3ccd5' fs solid 1 noborder title 'measured', ";
@@ -317,11 +345,11 @@ PlotNumber plot_distribution(Gnuplot& plots, const json& distribution) {
   return plots.add(kHalf_px, kLow_px, commands);
 }
 
-PlotNumber plot_msd(Gnuplot& plots, const json& msd) {
-  const std::vector<double> lag = numbers(msd, "lag_s"), measured = numbers(msd, "measured_mm2"),
-                            simulated = numbers(msd, "simulated_mm2");
+PlotNumber plot_msd(Gnuplot& plots, const identification::Msd& msd) {
+  const std::vector<double> lag = numbers(msd.lag_s()), measured = numbers(msd.measured_mm2()),
+                            simulated = numbers(msd.simulated_mm2());
   if (lag.size() < 2 || !any_finite(measured) || !any_finite(simulated)) return std::nullopt;
-  const std::vector<double> base = numbers(msd, "base_mm2");
+  const std::vector<double> base = numbers(msd.base_mm2());
   std::string commands = block("d", {lag, measured, simulated, base});
   commands +=
       "set logscale xy\nset format y '10^{%L}'\nset xlabel 'lag, s'\nset ylabel 'mean square displacement, "
@@ -331,9 +359,9 @@ PlotNumber plot_msd(Gnuplot& plots, const json& msd) {
   return plots.add(kHalf_px, kLow_px, commands);
 }
 
-PlotNumber plot_speed_over_time(Gnuplot& plots, const json& speeds) {
-  const std::vector<double> at = numbers(speeds, "time_s"), measured = numbers(speeds, "measured_mm_s"),
-                            simulated = numbers(speeds, "simulated_mm_s"), base = numbers(speeds, "base_mm_s");
+PlotNumber plot_speed_over_time(Gnuplot& plots, const identification::SpeedOverTime& speeds) {
+  const std::vector<double> at = numbers(speeds.time_s()), measured = numbers(speeds.measured_mm_s()),
+                            simulated = numbers(speeds.simulated_mm_s()), base = numbers(speeds.base_mm_s());
   if (at.size() < 2 || !any_finite(measured) || !any_finite(simulated)) return std::nullopt;
   std::string commands = block("d", {at, measured, simulated, base});
   commands +=
@@ -343,32 +371,48 @@ PlotNumber plot_speed_over_time(Gnuplot& plots, const json& speeds) {
   return plots.add(kHalf_px, kLow_px, commands);
 }
 
-PlotNumber plot_effect_map(Gnuplot& plots, const json& map) {
-  const std::string title = text(map, "which") + words_of(text(map, "acts_on"));
-  return plot_map(plots, map, "effect", title);
+PlotNumber plot_effect_map(Gnuplot& plots, const identification::EffectMap& map) {
+  const Grid grid(map, map.effect()), low(map, map.low()), high(map, map.high());
+  std::vector<std::vector<double>> marks(2);
+  if (grid.good() && low.good() && high.good()) {
+    // Every other cell, so that the colours stay visible.
+    for (std::size_t row = 0; row < grid.y.size(); row += 2) {
+      for (std::size_t col = 0; col < grid.x.size(); col += 2) {
+        if (!(low.value[row][col] <= 0 && high.value[row][col] >= 0)) continue;
+        marks[0].push_back(grid.x[col]);
+        marks[1].push_back(grid.y[row]);
+      }
+    }
+  }
+  return coloured(plots, grid, reach({&map.effect()}), map.which() + words_of(map.acts_on()), map.unit(), marks);
 }
 
-PlotNumber plot_effect(Gnuplot& plots, const json& curve) {
-  const std::vector<double> at = numbers(curve, "at"), value = numbers(curve, "value");
+PlotNumber plot_effect(Gnuplot& plots, const identification::EffectCurve& curve) {
+  const std::vector<double> at = numbers(curve.at()), value = numbers(curve.value()), low = numbers(curve.low()),
+                            high = numbers(curve.high());
   if (at.size() < 2 || value.size() != at.size() || !any_finite(value)) return std::nullopt;
-  std::string commands = block("d", {at, value});
-  const std::string acts_on = text(curve, "acts_on"), unit = text(curve, "acts_on_unit"),
-                    which = text(curve, "which");
-  commands += axis("x", text(curve, "covariate"), text(curve, "unit")) +
-              fmt::format("set ylabel {}\n", gnuplot_text(which + words_of(acts_on) + ", " + unit));
+  const bool band = low.size() == at.size() && high.size() == at.size() && any_finite(low) && any_finite(high);
+  std::string commands = band ? block("d", {at, value, low, high}) : block("d", {at, value});
+  commands += axis("x", curve.covariate(), curve.unit()) +
+              fmt::format("set ylabel {}\n",
+                          gnuplot_text(curve.which() + words_of(curve.acts_on()) + ", " + curve.acts_on_unit()));
   commands += "set xzeroaxis lc rgb '#8896a4'\nunset key\nset offsets 0, 0, graph 0.1, graph 0.1\n";
-  commands += "plot $d using 1:2 with lines lt 2";
+  commands += "plot ";
+  if (band) commands += "$d using 1:3:4 with filledcurves fc rgb '#c9d8ea' fs solid 1 noborder, ";
+  commands += "$d using 1:2 with lines lt 2";
   return plots.add(kHalf_px, kFlat_px, commands);
 }
 
-PlotNumber plot_steps(Gnuplot& plots, const json& steps, double floor_mm) {
-  if (!steps.is_array() || steps.size() < 2) return std::nullopt;
+PlotNumber plot_steps(Gnuplot& plots, const google::protobuf::RepeatedPtrField<identification::Step>& steps,
+                      double floor_mm) {
   std::string commands = "$d << EOD\n";
   double most = floor_mm;
   std::size_t count = 0;
-  for (const json& step : steps) {
-    const double rmse = number(step, "rmse_mm");
-    if (!std::isfinite(rmse)) continue;
+  std::vector<std::string> added;
+  for (const identification::Step& step : steps) {
+    const double rmse = step.rmse_mm();
+    if (!step.has_rmse_mm() || !std::isfinite(rmse)) continue;
+    added.push_back(step.added());
     commands += fmt::format("{} {:.6g} {:.2f}\n", count++, rmse, rmse);
     most = std::max(most, rmse);
   }
@@ -376,8 +420,7 @@ PlotNumber plot_steps(Gnuplot& plots, const json& steps, double floor_mm) {
   commands +=
       "EOD\nunset key\nset ylabel 'rms error, mm'\nset boxwidth 0.6\nset grid noxtics\nset xtics rotate by 0 (";
   for (std::size_t k = 0; k < count; ++k) {
-    commands +=
-        fmt::format("{}{} {}", k == 0 ? "" : ", ", gnuplot_text((k == 0 ? "" : "+ ") + text(steps[k], "added")), k);
+    commands += fmt::format("{}{} {}", k == 0 ? "" : ", ", gnuplot_text((k == 0 ? "" : "+ ") + added[k]), k);
   }
   commands +=
       fmt::format(")\nset xrange [-0.6:{}]\nset yrange [0:{}]\n", static_cast<double>(count) - 0.4, 1.15 * most);
@@ -388,17 +431,16 @@ PlotNumber plot_steps(Gnuplot& plots, const json& steps, double floor_mm) {
   return plots.add(count > 5 ? 2 * kHalf_px : kHalf_px, kLow_px, commands);
 }
 
-PlotNumber plot_robots(Gnuplot& plots, const json& robots) {
-  if (!robots.is_array()) return std::nullopt;
+PlotNumber plot_robots(Gnuplot& plots, const google::protobuf::RepeatedPtrField<identification::Robot>& robots) {
   struct Row {
     std::string name;
     double before, after;
   };
   std::vector<Row> rows;
-  for (const json& robot : robots) {
-    const Row row{robot.contains("robot") ? robot["robot"].dump() : "?", number(robot, "before_mm"),
-                  number(robot, "after_mm")};
-    if (std::isfinite(row.before) && std::isfinite(row.after)) rows.push_back(row);
+  for (const identification::Robot& robot : robots) {
+    const Row row{std::to_string(robot.robot()), kept(robot.before_mm()), kept(robot.after_mm())};
+    const bool known = robot.has_before_mm() && robot.has_after_mm();
+    if (known && std::isfinite(row.before) && std::isfinite(row.after)) rows.push_back(row);
   }
   if (rows.size() < 2) return std::nullopt;
   std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.before > b.before; });

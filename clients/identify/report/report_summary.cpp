@@ -5,12 +5,13 @@
 #include <algorithm>
 #include <vector>
 
-#include "clients/report/html.hpp"
-
 namespace kilotwin::identify::report {
 namespace {
 
-using html::escaped;
+using identification::Identification, identification::Result;
+
+/// "one effect", "3 effects".
+std::string effects_in_words(int count) { return count == 1 ? "one effect" : fmt::format("{} effects", count); }
 
 /// Share of the explainable mean square error that the model removes: (before^2 - after^2) / (before^2 - floor^2).
 std::optional<double> share_explained(const Errors& e) {
@@ -20,162 +21,183 @@ std::optional<double> share_explained(const Errors& e) {
   return std::clamp((*e.before * *e.before - *e.after * *e.after) / could, 0.0, 1.0);
 }
 
-/// Nothing is held out: the effects without an error.
-std::string verdict_without_errors(const json& contract) {
-  const std::string why = text(part(contract, "held_out"), "in_words");
-  const json& effects = part(contract, "effects");
-  const std::size_t count = effects.is_array() ? effects.size() : 0;
-  const std::string found = count == 0   ? "No tested effect is significant."
-                            : count == 1 ? "One effect is significant in the data of the fit."
-                                         : fmt::format("{} effects are significant in the data of the fit.", count);
-  return fmt::format("{} <b>{}</b>", found, escaped(why.empty() ? "The prediction error is unknown." : why));
-}
-
-}  // namespace
-
-Errors errors_of(const json& contract) {
-  return {number(part(contract, "before"), "rmse_mm"), number(part(contract, "after"), "rmse_mm"),
-          number(contract, "noise_floor_mm")};
-}
-
-std::string headline(const json& contract) {
+/// What the motion depends on, in the words of the headline.
+void add_headline(Data& page, const Result& result) {
   std::vector<std::string> phrases;
   bool tracker = false;
-  for (const json& effect : part(contract, "effects")) {
+  for (const identification::Effect& effect : result.effects()) {
     if (is_measurement(effect)) {
       tracker = true;
       continue;
     }
-    const std::string phrase = "<em>" + escaped(covariates_of(effect)) + "</em>";
+    const std::string phrase = covariates_of(effect.covariates());
     if (std::find(phrases.begin(), phrases.end(), phrase) == phrases.end()) phrases.push_back(phrase);
   }
-  const char* const kSeen = "<em>the measurement</em> has effects of its own";
-  if (phrases.empty() && !tracker)
-    return part(part(contract, "unexplained"), "large") == json(true)
-               ? "No tested effect explains how these data deviate from the base model"
-               : "No tested effect improves on the base model";
-  if (phrases.empty()) return fmt::format("The base model explains the motion, but {}", kSeen);
-  std::string because = phrases[0];
-  if (phrases.size() == 2) because += " and " + phrases[1];
-  if (phrases.size() > 2) because += ", " + phrases[1] + " and others";
-  return fmt::format("The motion deviates from the base model: it depends on {}{}", because,
-                     tracker ? fmt::format("; {}", kSeen) : "");
+  const Data yes{Data::type::bool_true};
+  if (tracker) page.set("tracker", yes);
+  if (phrases.empty() && !tracker) page.set(result.unexplained().large() ? "no_cause" : "no_effect", yes);
+  if (phrases.empty() && tracker) page.set("only_tracker", yes);
+  if (phrases.empty()) return;
+  Data depends{Data::type::object};
+  depends.set("first", phrases[0]);
+  if (phrases.size() > 1) depends.set("second", phrases[1]);
+  if (phrases.size() > 2) depends.set("others", yes);
+  page.set("depends", depends);
 }
 
-std::string verdict(const json& contract) {
-  const Errors e = errors_of(contract);
-  const std::string ahead = fmt::format("{:g}", number(contract, "horizon_s").value_or(10));
-  if (!e.before) return verdict_without_errors(contract);
-  std::string out = fmt::format(
-      "On held-out data, with a horizon of {} s, the base model has a prediction error of <b>{} mm</b> (root mean "
-      "square)",
-      ahead, figure(e.before));
-  const std::size_t count = part(contract, "effects").is_array() ? part(contract, "effects").size() : 0;
-  if (count == 0) {
-    const json& not_written = part(part(contract, "check"), "dropped");
-    out += not_written.is_array() && !not_written.empty() ? ". No effect is written."
-                                                          : ". No tested effect is significant.";
-    if (e.floor && e.before && *e.before > 1.15 * *e.floor)
-      out += " The error above the noise floor depends on no tested covariate.";
-  } else {
-    out += fmt::format("; with {} in the model the error is <b>{} mm</b>.",
-                       count == 1 ? "one effect" : fmt::format("{} effects", count), figure(e.after));
-    const json& less = part(contract, "improvement");
-    if (number(less, "low_mm"))
-      out += fmt::format(" The reduction is {} to {} mm (95 %).", figure(number(less, "low_mm")),
-                         figure(number(less, "high_mm")));
+/// Nothing is held out: the effects without an error.
+Data unconfirmed_of(const Result& result) {
+  Data out{Data::type::object};
+  const int count = result.effects_size();
+  out.set("significant", count == 0   ? "No tested effect is significant."
+                         : count == 1 ? "One effect is significant in the data of the fit."
+                                      : fmt::format("{} effects are significant in the data of the fit.", count));
+  const std::string& why = result.held_out().in_words();
+  out.set("why", why.empty() ? "The prediction error is unknown." : why);
+  return out;
+}
+
+void add_errors(Data& to, const Result& result, const Errors& e) {
+  to.set("horizon", fmt::format("{:g}", result.has_horizon_s() ? result.horizon_s() : 10));
+  to.set("error_before", figure(e.before));
+  if (result.effects_size() == 0) {
+    std::string none =
+        result.check().dropped().empty() ? "No tested effect is significant." : "No effect is written.";
+    if (e.floor && *e.before > 1.15 * *e.floor)
+      none += " The error above the noise floor depends on no tested covariate.";
+    to.set("none", none);
+    return;
   }
-  const json& free = part(contract, "free");
-  if (const auto share = number(free, "share_of_rows"); share && number(free, "after_mm") && *share < 0.98)
-    out += fmt::format(
-        " For robots that stay away from walls and from each other ({} of the predictions) it is <b>{} mm</b> "
-        "before and "
-        "<b>{} mm</b> after.",
-        percent(share), figure(number(free, "before_mm")), figure(number(free, "after_mm")));
-  for (const char* of : {"command_lag", "numbering", "check"})
-    if (const std::string words = text(part(contract, of), "in_words"); !words.empty()) out += " " + escaped(words);
-  if (const json& dropped = part(part(contract, "check"), "dropped"); dropped.is_array() && !dropped.empty())
-    out += fmt::format(" {} not written: held-out data are predicted no better with {}.",
-                       dropped.size() == 1 ? "One effect was" : fmt::format("{} effects were", dropped.size()),
-                       dropped.size() == 1 ? "it" : "them");
-  if (part(part(contract, "unexplained"), "large") == json(true))
-    out += fmt::format(" <a href=\"#unexplained\"><b>{} mm</b> of it are systematic and unexplained</a>.",
-                       figure(number(part(contract, "unexplained"), "systematic_mm")));
-  if (e.floor && e.after && *e.after <= *e.floor) {
-    out += fmt::format(" That is at the noise floor of these robots and this tracker (about <b>{} mm</b>).",
-                       figure(e.floor));
-  } else if (e.floor) {
-    out += fmt::format(" The noise floor of these robots and this tracker is about <b>{} mm</b>.", figure(e.floor));
-  }
-  const json& simulated = part(contract, "simulated");
-  if (part(simulated, "agrees").is_boolean()) {
-    std::size_t differ = 0, all = 0;
-    for (const json& s : part(simulated, "statistics")) {
-      ++all;
-      if (part(s, "agrees") == json(false)) ++differ;
-    }
-    out += differ == 0
-               ? " <a href=\"#simulated\">Simulations</a> of the written model agree with the measured "
-                 "tracks."
-               : fmt::format(
-                     " <a href=\"#simulated\">Simulations</a> of the written model differ from the measured "
-                     "tracks in {} of {} statistics.",
-                     differ, all);
-  }
-  const json& faults = part(contract, "faults");
-  if (const auto share = share_explained(e); share && count > 0)
-    out += fmt::format(" The model removes {} of the explainable mean square error.", percent(share));
-  const auto of_test =
-      std::count_if(faults.begin(), faults.end(), [](const json& fault) { return text(fault, "set") == "test"; });
-  const auto of_train = (faults.is_array() ? static_cast<std::ptrdiff_t>(faults.size()) : 0) - of_test;
-  const auto in_words = [](std::ptrdiff_t n) {
-    return fmt::format("<a href=\"#faults\">{}</a>, which {}", n == 1 ? "a fault" : fmt::format("{} faults", n),
-                       n == 1 ? "is" : "are");
+  to.set("count", effects_in_words(result.effects_size()));
+  to.set("error_after", figure(e.after));
+  const identification::Improvement& less = result.improvement();
+  if (!less.has_low_mm()) return;
+  to.set("less_low", figure(less.low_mm()));
+  to.set("less_high", figure(known(less.has_high_mm(), less.high_mm())));
+}
+
+void add_free_robots(Data& to, const identification::FreeRobots& free) {
+  const auto after_mm = number(free.after_mm());
+  if (!after_mm || !(free.share_of_rows() < 0.98)) return;
+  Data out{Data::type::object};
+  out.set("share", percent(free.share_of_rows()));
+  out.set("free_before", figure(number(free.before_mm())));
+  out.set("free_after", figure(after_mm));
+  to.set("free", out);
+}
+
+/// Sentences of the result about its data and its search.
+Data remarks_of(const Result& result) {
+  Data out{Data::type::list};
+  const auto add = [&](const std::string& text) {
+    if (!text.empty()) out << Data{"remark", text};
   };
-  if (of_train > 0) out += fmt::format(" The data have {} excluded from the fit.", in_words(of_train));
-  if (of_test > 0) out += fmt::format(" The test data have {} part of the error.", in_words(of_test));
-  if (const std::string next = text(contract, "next"); !next.empty()) out += " <b>Next:</b> " + escaped(next);
+  add(result.command_lag().in_words());
+  add(result.numbering().in_words());
+  add(result.check().in_words());
+  if (const int dropped = result.check().dropped_size(); dropped > 0)
+    add(fmt::format("{} not written: held-out data are predicted no better with {}.",
+                    dropped == 1 ? "One effect was" : fmt::format("{} effects were", dropped),
+                    dropped == 1 ? "it" : "them"));
   return out;
 }
 
-namespace {
+void add_simulated(Data& to, const identification::Simulated& simulated) {
+  if (simulated.agrees().kind_case() != google::protobuf::Value::kBoolValue) return;
+  const auto differs = [](const identification::SimulatedStatistic& s) {
+    return s.agrees().kind_case() == google::protobuf::Value::kBoolValue && !s.agrees().bool_value();
+  };
+  const auto differ = std::count_if(simulated.statistics().begin(), simulated.statistics().end(), differs);
+  Data out{Data::type::object};
+  out.set("outcome", differ == 0 ? "agree with the measured tracks"
+                                 : fmt::format("differ from the measured tracks in {} of {} statistics", differ,
+                                               simulated.statistics_size()));
+  to.set("simulations", out);
+}
 
-/// "<b>1.2 mm</b> <small>1.1 to 1.3 (95 %)</small>", as markup.
-std::string with_interval(std::optional<double> value, const std::string& unit, std::optional<double> low,
-                          std::optional<double> high) {
-  std::string out = fmt::format("<b>{} {}</b>", figure(value), escaped(unit));
-  if (low && high) out += fmt::format(" <small>{} to {} (95 %)</small>", figure(low), figure(high));
-  return out;
+void add_faults(Data& to, const Result& result) {
+  const auto of_test = std::count_if(result.faults().begin(), result.faults().end(),
+                                     [](const identification::Fault& fault) { return fault.set() == "test"; });
+  const auto set = [&](const char* name, std::ptrdiff_t count) {
+    if (count == 0) return;
+    Data out{Data::type::object};
+    out.set("faults_in_words", count == 1 ? "a fault" : fmt::format("{} faults", count));
+    out.set("are", count == 1 ? "is" : "are");
+    to.set(name, out);
+  };
+  set("train_faults", result.faults_size() - of_test);
+  set("test_faults", of_test);
+}
+
+/// The sentences below the headline.
+void add_verdict(Data& page, const Result& result) {
+  const Errors e = errors_of(result);
+  if (!e.before) {
+    page.set("unconfirmed", unconfirmed_of(result));
+    return;
+  }
+  Data out{Data::type::object};
+  add_errors(out, result, e);
+  add_free_robots(out, result.free());
+  out.set("remarks", remarks_of(result));
+  if (result.unexplained().large()) out.set("systematic", figure(result.unexplained().systematic_mm()));
+  if (e.floor) out.set(e.after && *e.after <= *e.floor ? "at_floor" : "above_floor", figure(e.floor));
+  add_simulated(out, result.simulated());
+  if (const auto share = share_explained(e); share && result.effects_size() > 0)
+    out.set("explained", percent(share));
+  add_faults(out, result);
+  set_text(out, "next", result.next());
+  page.set("confirmed", out);
+}
+
+html::Bar bar_of(const std::string& kind, const std::string& name, double length, const std::string& value,
+                 std::optional<double> low, std::optional<double> high) {
+  return {name, kind, length, value, low && high ? fmt::format("{} to {} (95 %)", figure(low), figure(high)) : ""};
+}
+
+/// The errors as bars, with their confidence intervals.
+std::string bars_of_errors(const Result& result) {
+  const Errors e = errors_of(result);
+  if (!e.before || !e.after) return "";
+  const auto bar = [](const char* kind, double value, const identification::Accuracy& of) {
+    return bar_of(kind, kind, value, figure(value) + " mm", known(of.has_rmse_low_mm(), of.rmse_low_mm()),
+                  known(of.has_rmse_high_mm(), of.rmse_high_mm()));
+  };
+  std::vector<html::Bar> all{bar("before", *e.before, result.before()), bar("after", *e.after, result.after())};
+  if (e.floor) all.push_back(bar_of("floor", "noise floor", *e.floor, figure(e.floor) + " mm", {}, {}));
+  return html::bars(all, std::max({*e.before, *e.after, e.floor.value_or(0), result.before().rmse_high_mm()}));
+}
+
+/// Bars of any quantity. A bar starts at `from`.
+std::string bars_of(const google::protobuf::RepeatedPtrField<identification::Bar>& bars) {
+  double most = 0;
+  std::vector<html::Bar> all;
+  for (const identification::Bar& bar : bars) {
+    most = std::max({most, bar.value() - bar.from(), bar.has_high() ? bar.high() - bar.from() : 0.0});
+    all.push_back(bar_of(bar.kind(), bar.name(), bar.value() - bar.from(),
+                         fmt::format("{} {}", figure(bar.value()), bar.unit()), known(bar.has_low(), bar.low()),
+                         known(bar.has_high(), bar.high())));
+  }
+  return html::bars(all, most);
 }
 
 }  // namespace
 
-std::string bars(const json& contract) {
-  const Errors e = errors_of(contract);
-  if (!e.before || !e.after) return "";
-  const double most = std::max(
-      {*e.before, *e.after, e.floor.value_or(0), number(part(contract, "before"), "rmse_high_mm").value_or(0)});
-  const auto bar = [](const char* kind, const char* name, double value, const json& from) {
-    return html::Bar{name, kind, value,
-                     with_interval(value, "mm", number(from, "rmse_low_mm"), number(from, "rmse_high_mm"))};
-  };
-  std::vector<html::Bar> all{bar("before", "before", *e.before, part(contract, "before")),
-                             bar("after", "after", *e.after, part(contract, "after"))};
-  if (e.floor) all.push_back(bar("floor", "noise floor", *e.floor, json()));
-  return html::bars(all, most);
+Errors errors_of(const Result& result) {
+  return {number(result.before().rmse_mm()), number(result.after().rmse_mm()),
+          known(result.has_noise_floor_mm(), result.noise_floor_mm())};
 }
 
-std::string given_bars(const json& bars) {
-  double most = 0;
-  std::vector<html::Bar> all;
-  for (const json& bar : bars) {
-    const double from = number(bar, "from").value_or(0), value = number(bar, "value").value_or(0);
-    const auto low = number(bar, "low"), high = number(bar, "high");
-    most = std::max({most, value - from, high.value_or(0) - from});
-    all.push_back({text(bar, "name"), text(bar, "kind"), value - from,
-                   with_interval(number(bar, "value"), text(bar, "unit"), low, high)});
-  }
-  return html::bars(all, most);
+void add_summary(Data& page, const Identification& found) {
+  if (found.has_headline())
+    page.set("headline", found.headline());
+  else
+    add_headline(page, found.result());
+  if (found.has_verdict())
+    page.set("verdict", found.verdict());
+  else
+    add_verdict(page, found.result());
+  page.set("bars", found.bars().empty() ? bars_of_errors(found.result()) : bars_of(found.bars()));
 }
 
 }  // namespace kilotwin::identify::report

@@ -3,18 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
 #include "clients/identify/report/report_plots.hpp"
-#include "clients/report/html.hpp"
 
 namespace kilotwin::identify::report {
 namespace {
-
-using html::escaped;
-
-const json kNothing;
 
 /// A covariate as the object of "depends on ...".
 std::string phrase_of(const std::string& covariate) {
@@ -33,23 +29,24 @@ std::string phrase_of(const std::string& covariate) {
   return at == kPhrases.end() ? words_of(covariate) : at->second;
 }
 
+/// A whole number in superscript digits.
+std::string superscript(int value) {
+  constexpr std::array kDigits = {"⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"};
+  std::string out = value < 0 ? "⁻" : "";
+  for (const char digit : std::to_string(std::abs(value))) out += kDigits[static_cast<std::size_t>(digit - '0')];
+  return out;
+}
+
+std::vector<std::string> escaped(const std::vector<std::string>& texts) {
+  std::vector<std::string> out;
+  for (const std::string& text : texts) out.push_back(html::escaped(text));
+  return out;
+}
+
 }  // namespace
 
-const json& part(const json& from, const char* key) {
-  if (!from.is_object()) return kNothing;
-  const auto at = from.find(key);
-  return at == from.end() ? kNothing : *at;
-}
-
-std::string text(const json& from, const char* key) {
-  const json& value = part(from, key);
-  return value.is_string() ? value.get<std::string>() : value.is_null() ? "" : value.dump();
-}
-
-std::optional<double> number(const json& from, const char* key) {
-  const json& value = part(from, key);
-  if (!value.is_number()) return std::nullopt;
-  return value.get<double>();
+std::optional<double> number(const google::protobuf::Value& value) {
+  return known(value.kind_case() == google::protobuf::Value::kNumberValue, value.number_value());
 }
 
 std::string figure(std::optional<double> value) {
@@ -64,26 +61,30 @@ std::string figure(std::optional<double> value) {
 std::string percent(std::optional<double> share) { return share ? fmt::format("{:.0f} %", 100 * *share) : "–"; }
 
 std::string chance(std::optional<double> log10_p) {
-  if (!log10_p) return "–";
+  if (!log10_p || !std::isfinite(*log10_p)) return "–";
   if (*log10_p > -2.5) return fmt::format("{:.2g}", std::pow(10, *log10_p));
-  return fmt::format("10<sup>−{:.0f}</sup>", -*log10_p);
+  // Beyond, no digit of the exponent means anything.
+  constexpr double kLeast = -99999;
+  return "10" + superscript(static_cast<int>(std::lround(std::max(*log10_p, kLeast))));
 }
 
-std::string covariates_of(const json& effect) {
+std::optional<double> log10_of(std::optional<double> p) {
+  return p ? std::optional(std::log10(std::max(*p, 1e-300))) : std::nullopt;
+}
+
+std::string covariates_of(const Texts& covariates) {
   std::string out;
-  for (const json& covariate : part(effect, "covariates")) {
-    if (covariate.is_string()) out += (out.empty() ? "" : " and ") + phrase_of(covariate.get<std::string>());
-  }
+  for (const std::string& covariate : covariates) out += (out.empty() ? "" : " and ") + phrase_of(covariate);
   return out.empty() ? "no covariate (constant)" : out;
 }
 
-bool is_measurement(const json& effect) {
-  if (text(effect, "acts_on").starts_with("MEASURED")) return true;
-  const json& covariates = part(effect, "covariates");
-  return std::any_of(covariates.begin(), covariates.end(), [](const json& c) { return c == "measurement"; });
+bool is_measurement(const identification::Effect& effect) {
+  return effect.acts_on().starts_with("MEASURED") ||
+         std::find(effect.covariates().begin(), effect.covariates().end(), "measurement") !=
+             effect.covariates().end();
 }
 
-std::string acts_on_of(const json& effect) {
+std::string acts_on_in_words(const std::string& acts_on) {
   static const std::map<std::string, std::string> kWords = {{"WHEEL_GAIN", "wheel speeds (gain)"},
                                                             {"WHEEL_OFFSET", "wheel speeds (offset)"},
                                                             {"TURN_RATE", "turn rate"},
@@ -92,10 +93,21 @@ std::string acts_on_of(const json& effect) {
                                                             {"MEASURED_OFFSET", "measured position"},
                                                             {"MEASURED_BODY_OFFSET", "tracked point"},
                                                             {"MEASURED_SCALE", "camera scale"},
-                                                            {"MEASURED_HEADING", "measured heading"}};
-  const std::string name = text(effect, "acts_on");
-  const auto at = kWords.find(name);
-  return at == kWords.end() ? escaped(words_of(name)) : at->second;
+                                                            {"MEASURED_HEADING", "measured heading"},
+                                                            {"NOISE", "size of the motion noise"}};
+  const auto at = kWords.find(acts_on);
+  return at == kWords.end() ? words_of(acts_on) : at->second;
+}
+
+void set_text(Data& to, const std::string& name, const std::string& text) {
+  if (!text.empty()) to.set(name, text);
+}
+
+std::string table_of(const std::vector<std::string>& heads, const std::vector<std::vector<std::string>>& rows,
+                     const char* kind) {
+  html::Table table(escaped(heads));
+  for (const std::vector<std::string>& row : rows) table.row(escaped(row));
+  return table.text(kind);
 }
 
 }  // namespace kilotwin::identify::report

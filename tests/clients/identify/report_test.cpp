@@ -13,6 +13,7 @@
 #include <random>
 #include <string>
 
+#include "clients/identify/report/report_plots.hpp"
 #include "clients/report/gnuplot.hpp"
 #include "clients/report/html.hpp"
 #include "core/base/error.hpp"
@@ -37,8 +38,10 @@ json full_document() {
       "rejected": [{"name": "grain", "covariates": ["heading"], "acts_on": "WHEEL_GAIN", "log10_p": -2.9, "threshold_log10_p": -5}],
       "ambiguous": [{"found": "time", "instead": "motor_time", "log_likelihood_difference": 3.1, "experiment": "Let some rest."}],
       "faults": [{"kind": "swapped", "run": "1", "robot": 3, "in_words": "Robots 3 and 9 carry each other's number."}],
-      "robots": [{"robot": 0, "before_mm": 15, "after_mm": 3}, {"robot": 1, "before_mm": 17, "after_mm": 4}],
-      "base": {"straight_speed_mm_s": 9.98, "wheel_base_mm": 25}, "noise": {"factor_variance_s": 0.0014}},
+      "robots": [{"robot": 0, "before_mm": 15, "after_mm": 3, "bias_left_mm_s": -0.8, "sd_left_mm_s": 0.1, "noise_ratio": 1.9,
+                  "noise_ratio_low": 1.5, "noise_ratio_high": 2.3}, {"robot": 1, "before_mm": 17, "after_mm": 4}],
+      "base": {"straight_speed_mm_s": 9.98, "wheel_base_mm": 25}, "noise": {"factor_variance_s": 0.0014},
+      "noise_low": {"factor_variance_s": 0.0012}, "noise_high": {"factor_variance_s": 0.0017}, "base_sd": {"wheel_base_mm": 0.5}},
     "set": {"runs": 3, "robots": 16, "has_headings": true},
     "steps": [{"added": "base model", "rmse_mm": 16.3}, {"added": "battery", "rmse_mm": 5.9}, {"added": "lens", "rmse_mm": 3.5}],
     "msd": {"lag_s": [1, 10, 100], "measured_mm2": [90, 6000, 60000], "simulated_mm2": [91, 6100, 59000]},
@@ -89,13 +92,64 @@ TEST(Report, ShowsTheDocument) {
   EXPECT_TRUE(parses(page));
   for (const char* said :
        {"time in the run", "the measurement", "16.3 mm", "3.52 mm", "3.38 mm", "Wheels run slower the later it is.",
-        "10<sup>−200</sup>", "Robots 3 and 9 carry each other", "Let some rest.", "grain", "id=\"maps\"",
-        "id=\"simulated\"", "wheel base, mm", "83 %"}) {
+        "10⁻²⁰⁰", "Robots 3 and 9 carry each other", "Let some rest.", "grain", "id=\"maps\"", "id=\"simulated\"",
+        "wheel base, mm", "83 %"}) {
     EXPECT_NE(page.find(said), std::string::npos) << said;
   }
   // Plots: one card, horizon, steps, robots, two maps and two arrow maps, one covariate, one distribution, MSD.
   EXPECT_EQ(count(page, "<img "), 11U);
   EXPECT_EQ(count(page, "<plot "), 0U);
+}
+
+TEST(Report, StatesIntervals) {
+  const std::string page = page_of(full_document());
+  for (const char* said : {"0.00140 (0.00120 to 0.00170)", "25.0 ± 0.980", "-0.800 ± 0.196", "1.90 (1.50 to 2.30)"})
+    EXPECT_NE(page.find(said), std::string::npos) << said;
+}
+
+/// Number of drawn shapes of a colour.
+std::size_t shapes(const Gnuplot& plots, const std::string& colour) {
+  return count(plots.draw().at(0).svg, "rgb(" + colour + ")");
+}
+
+TEST(Report, DrawsTheBandOfACurve) {
+  identification::EffectCurve curve;
+  for (const double at : {0.0, 1.0, 2.0}) {
+    curve.add_at(at);
+    curve.add_value(at);
+  }
+  const std::string band = "201, 216, 234";
+  Gnuplot without, with;
+  ASSERT_TRUE(plot_effect(without, curve));
+  EXPECT_EQ(shapes(without, band), 0U);
+  for (const double at : {0.0, 1.0, 2.0}) {
+    curve.add_low(at - 1);
+    curve.add_high(at + 1);
+  }
+  ASSERT_TRUE(plot_effect(with, curve));
+  EXPECT_GT(shapes(with, band), 0U);
+}
+
+TEST(Report, MarksWhereTheBandOfAMapHoldsZero) {
+  // The interval of the first of three columns holds zero.
+  identification::EffectMap map;
+  for (const double at : {0.0, 10.0, 20.0}) {
+    map.add_x_mm(at);
+    map.add_y_mm(at);
+    auto &effect = *map.add_effect(), &low = *map.add_low(), &high = *map.add_high();
+    for (const double value : {1.0, 5.0, 9.0}) {
+      effect.add_values()->set_number_value(value);
+      low.add_values()->set_number_value(value - 2);
+      high.add_values()->set_number_value(value + 2);
+    }
+  }
+  const std::string marks = " 90, 102, 115";
+  Gnuplot with, without;
+  ASSERT_TRUE(plot_effect_map(with, map));
+  EXPECT_GT(shapes(with, marks), 0U);
+  for (auto& row : *map.mutable_low()) row.mutable_values(0)->set_number_value(0.5);
+  ASSERT_TRUE(plot_effect_map(without, map));
+  EXPECT_EQ(shapes(without, marks), 0U);
 }
 
 TEST(Report, IsSelfContained) {
