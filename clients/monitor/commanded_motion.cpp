@@ -54,6 +54,7 @@ void CommandedMotion::advance(const SwarmView& swarm, std::span<const Duties> du
     WheelMotion now;
     now.nominal_left_mm_s = drives_.left_mm_s[i];
     now.nominal_right_mm_s = drives_.right_mm_s[i];
+    now.limit_mm_s = plan_.motion_settings().effects_limit_mm_s;
     now.driven = duties[watched_[i]].any() ? 1 : 0;
     now.change_left_mm_s = now.nominal_left_mm_s - before.nominal_left_mm_s;
     now.change_right_mm_s = now.nominal_right_mm_s - before.nominal_right_mm_s;
@@ -79,9 +80,9 @@ void CommandedMotion::add_effects(Tick from, const SwarmView& swarm, std::span<c
     motion.gain_right = changes_.right_gain[i];
     motion.offset_left_mm_s = changes_.left_mm_s[i];
     motion.offset_right_mm_s = changes_.right_mm_s[i];
-    motion.sideways_mm_s = changes_.sideways_mm_s[i];
-    motion.drift_x_mm_s = changes_.drift_x_mm_s[i];
-    motion.drift_y_mm_s = changes_.drift_y_mm_s[i];
+    motion.sideways_mm_s = limited(changes_.sideways_mm_s[i], motion.limit_mm_s);
+    motion.drift_x_mm_s = limited(changes_.drift_x_mm_s[i], motion.limit_mm_s);
+    motion.drift_y_mm_s = limited(changes_.drift_y_mm_s[i], motion.limit_mm_s);
   }
 }
 

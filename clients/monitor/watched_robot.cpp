@@ -81,6 +81,7 @@ WheelMotion WatchedRobot::mean_motion(std::int64_t from_cycle, std::int64_t to_c
   }
   WheelMotion mean;
   mean.gain_left = mean.gain_right = 0;
+  mean.limit_mm_s = motion_of(from_cycle / tick_cycles).limit_mm_s;
   for (std::int64_t tick = from_cycle / tick_cycles; tick * tick_cycles < to_cycle; ++tick) {
     const WheelMotion& motion = motion_of(tick);
     const std::int64_t from = std::max(from_cycle, tick * tick_cycles);

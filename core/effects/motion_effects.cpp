@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/effects/motion_change.hpp"
 #include "core/plan/motion_settings.hpp"
 
 namespace kilotwin {
@@ -11,6 +12,10 @@ using Target = EffectSettings::Target;
 namespace {
 
 double magnitude(double v) { return v < 0 ? -v : v; }
+
+UnitOffsets offsets_of(const Term& term, double half_base_mm) {
+  return unit_offsets(term.target, term.left, term.right, term.along, term.across, 2 * half_base_mm);
+}
 
 }  // namespace
 
@@ -31,24 +36,17 @@ MotionEffects::Limits MotionEffects::limits(double top_wheel_mm_s) const {
   Limits limits;
   for (const Term& term : terms_.terms()) {
     const double largest = terms_.largest(term);
-    switch (term.target) {
-      case Target::kWheelGain:
-        if (term.sum)
-          sums[*term.sum] += largest;
-        else
-          gain *= 1 + largest;
-        break;
-      case Target::kWheelOffset: limits.wheel_mm_s += largest; break;
-      case Target::kTurnRate: limits.wheel_mm_s += largest * half_base_mm_; break;
-      case Target::kBodyDrift:
-        limits.wheel_mm_s += largest * magnitude(term.along);
-        limits.sideways_mm_s += largest * magnitude(term.across);
-        break;
-      case Target::kWorldDrift:
-        limits.drift_mm_s += largest * std::max(magnitude(term.along), magnitude(term.across));
-        break;
-      default: break;
+    if (term.target == Target::kWheelGain) {
+      if (term.sum)
+        sums[*term.sum] += largest;
+      else
+        gain *= 1 + largest;
+      continue;
     }
+    const UnitOffsets unit = offsets_of(term, half_base_mm_);
+    limits.wheel_mm_s += largest * std::max(magnitude(unit.left), magnitude(unit.right));
+    limits.sideways_mm_s += largest * magnitude(unit.sideways);
+    limits.drift_mm_s += largest * std::max(magnitude(unit.drift_x), magnitude(unit.drift_y));
   }
   for (const double sum : sums) gain *= 1 + sum;
   limits.wheel_mm_s += (gain - 1) * top_wheel_mm_s;
@@ -72,44 +70,33 @@ void MotionEffects::evaluate(Tick from, const RobotColumns& robots, std::span<co
     sum.right.assign(count, 0);
   }
   const auto add = [count](std::vector<double>& to, std::span<const double> values, double factor) {
+    if (factor == 0) return;
     for (std::size_t i = 0; i < count; ++i) to[i] += factor * values[i];
   };
+  const auto multiply = [count](std::vector<double>& gain, std::span<const double> values) {
+    for (std::size_t i = 0; i < count; ++i) gain[i] *= 1 + values[i];
+  };
   terms_.evaluate(from, robots, who, fields, [&](const Term& term, std::span<const double> values) {
-    switch (term.target) {
-      case Target::kWheelGain:
-        if (term.sum) {
-          if (term.left) add(sums_[*term.sum].left, values, 1);
-          if (term.right) add(sums_[*term.sum].right, values, 1);
-          break;
-        }
-        for (std::size_t i = 0; i < count; ++i) {
-          if (term.left) changes.left_gain[i] *= 1 + values[i];
-          if (term.right) changes.right_gain[i] *= 1 + values[i];
-        }
-        break;
-      case Target::kWheelOffset:
-        if (term.left) add(changes.left_mm_s, values, 1);
-        if (term.right) add(changes.right_mm_s, values, 1);
-        break;
-      case Target::kTurnRate:
-        add(changes.left_mm_s, values, -half_base_mm_);
-        add(changes.right_mm_s, values, half_base_mm_);
-        break;
-      case Target::kBodyDrift:
-        add(changes.left_mm_s, values, term.along);
-        add(changes.right_mm_s, values, term.along);
-        add(changes.sideways_mm_s, values, term.across);
-        break;
-      case Target::kWorldDrift:
-        add(changes.drift_x_mm_s, values, term.along);
-        add(changes.drift_y_mm_s, values, term.across);
-        break;
-      default: break;
+    if (term.target == Target::kWheelGain) {
+      if (term.sum) {
+        if (term.left) add(sums_[*term.sum].left, values, 1);
+        if (term.right) add(sums_[*term.sum].right, values, 1);
+      } else {
+        if (term.left) multiply(changes.left_gain, values);
+        if (term.right) multiply(changes.right_gain, values);
+      }
+      return;
     }
+    const UnitOffsets unit = offsets_of(term, half_base_mm_);
+    add(changes.left_mm_s, values, unit.left);
+    add(changes.right_mm_s, values, unit.right);
+    add(changes.sideways_mm_s, values, unit.sideways);
+    add(changes.drift_x_mm_s, values, unit.drift_x);
+    add(changes.drift_y_mm_s, values, unit.drift_y);
   });
   for (const GainSum& sum : sums_) {
-    for (std::size_t i = 0; i < count; ++i) changes.left_gain[i] *= 1 + sum.left[i];
-    for (std::size_t i = 0; i < count; ++i) changes.right_gain[i] *= 1 + sum.right[i];
+    multiply(changes.left_gain, sum.left);
+    multiply(changes.right_gain, sum.right);
   }
 }
 

@@ -4,6 +4,7 @@
 #include <map>
 #include <utility>
 
+#include "core/effects/motion_change.hpp"
 #include "core/math/elementary.h"
 #include "core/plan/motion_settings.hpp"
 
@@ -229,18 +230,17 @@ void DriveModel::change(Drives& drives, Tick from, const RobotColumns& known, co
   const std::size_t count = drives.count;
   MotionChanges& changes = drives.changes;
   effects_.evaluate(from, known, std::span(drives.body).first(count), fields, changes);
-  const auto within = [](double v, double limit) { return std::clamp(v, -limit, limit); };
   for (std::size_t i = 0; i < count; ++i) {
     double& left = drives.left_mm_s[i];
     double& right = drives.right_mm_s[i];
-    left += within(left * (changes.left_gain[i] - 1) + changes.left_mm_s[i], limits_.wheel_mm_s);
-    right += within(right * (changes.right_gain[i] - 1) + changes.right_mm_s[i], limits_.wheel_mm_s);
+    left = changed_speed(left, changes.left_gain[i], changes.left_mm_s[i], limits_.wheel_mm_s);
+    right = changed_speed(right, changes.right_gain[i], changes.right_mm_s[i], limits_.wheel_mm_s);
   }
   if (!effects_.drift()) return;
   for (std::size_t i = 0; i < count; ++i) {
-    changes.sideways_mm_s[i] = within(changes.sideways_mm_s[i], limits_.sideways_mm_s);
-    changes.drift_x_mm_s[i] = within(changes.drift_x_mm_s[i], limits_.drift_mm_s);
-    changes.drift_y_mm_s[i] = within(changes.drift_y_mm_s[i], limits_.drift_mm_s);
+    changes.sideways_mm_s[i] = limited(changes.sideways_mm_s[i], limits_.sideways_mm_s);
+    changes.drift_x_mm_s[i] = limited(changes.drift_x_mm_s[i], limits_.drift_mm_s);
+    changes.drift_y_mm_s[i] = limited(changes.drift_y_mm_s[i], limits_.drift_mm_s);
   }
 }
 

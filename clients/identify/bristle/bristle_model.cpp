@@ -10,6 +10,8 @@
 #include <set>
 
 #include "clients/identify/bristle/velocity_circle.hpp"
+#include "clients/identify/model/motion_model.hpp"
+#include "core/effects/motion_change.hpp"
 #include "core/stats/quantiles.hpp"
 
 namespace kilotwin::bristle {
@@ -24,6 +26,8 @@ constexpr std::size_t kFewestOnCircle = 12;
 constexpr double kOneWay = 0.7;
 constexpr std::size_t kFewestRuns = 4;
 constexpr std::complex<double> kI(0, 1);
+/// Default of Motion.wheel_base_mm in idl/model.proto. Without commands that turn, motion does not depend on it.
+constexpr double kWheelBase_mm = 25;
 
 std::complex<double> unit(double angle_rad) { return std::exp(kI * angle_rad); }
 
@@ -101,6 +105,16 @@ double chance_of_mean(const std::vector<double>& xs, const std::vector<double>& 
   const double square = count * mean * covariance.ldlt().solve(mean.transpose());
   const double f = square * (count - 2) / (2 * (count - 1));
   return std::pow(1 + 2 * f / (count - 2), -(count - 2) / 2);
+}
+
+/// Speeds of a robot with both wheels at `speed_mm_s`, under a turn rate and a drift.
+identify::Rates driven(double speed_mm_s, double turn_rad_s, std::complex<double> drift_mm_s) {
+  using Target = EffectSettings::Target;
+  MotionChange change;
+  unit_offsets(Target::kTurnRate, true, true, 1, 0, kWheelBase_mm).add_to(change, turn_rad_s);
+  unit_offsets(Target::kWorldDrift, true, true, 1, 0, kWheelBase_mm).add_to(change, drift_mm_s.real());
+  unit_offsets(Target::kWorldDrift, true, true, 0, 1, kWheelBase_mm).add_to(change, drift_mm_s.imag());
+  return {changed_speeds(speed_mm_s, speed_mm_s, change, effects_limit_mm_s(speed_mm_s))};
 }
 
 /// Estimates of one run from its past, shrunk towards the population.
@@ -254,14 +268,11 @@ std::vector<BristleModel::Place> BristleModel::predict(const std::vector<Bristle
     run = now.run;
     past.add(now, *this, on);
     const double speed = has(BristleEffect::kSpeed) ? past.own_speed(has(BristleEffect::kDrift)) : speed_mm_s;
-    std::complex<double> way = speed * horizon_s * past.direction(now, *this, on);
-    if (has(BristleEffect::kTurn)) {
-      // Along an arc.
-      const double turn = past.own_turn() * horizon_s;
-      if (std::abs(turn) > 1e-6) way *= (unit(turn) - 1.0) / (kI * turn);
-    }
-    if (has(BristleEffect::kDrift)) way += speed * horizon_s * past.circle.drift;
-    places.push_back({now.x_mm + way.real(), now.y_mm + way.imag()});
+    const std::complex<double> drift = has(BristleEffect::kDrift) ? speed * past.circle.drift : 0;
+    const double turn_rad_s = has(BristleEffect::kTurn) ? past.own_turn() : 0;
+    const identify::Arc arc = identify::arc_of(driven(speed, turn_rad_s, drift), kWheelBase_mm,
+                                               std::arg(past.direction(now, *this, on)), horizon_s);
+    places.push_back({now.x_mm + arc.dx_mm, now.y_mm + arc.dy_mm});
   }
   return places;
 }

@@ -1,6 +1,7 @@
 /// Motion of robots with constantly driven motors on a bristle plate, and effects of table and tracker on it.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <string>
 #include <vector>
@@ -20,6 +21,9 @@ enum class BristleEffect : std::uint8_t {
   kTurn,   ///< turn rate per run
 };
 inline constexpr std::size_t kBristleEffects = 6;
+/// Limit of effects on speeds in the model file (Motion.effects_limit_mm_s). `speed_mm_s`: of the robots.
+[[nodiscard]] constexpr double effects_limit_mm_s(double speed_mm_s) { return std::max(50.0, 2 * speed_mm_s); }
+
 using BristleEffects = std::array<bool, kBristleEffects>;
 
 /// Observations of a run at one instant, from its past only, and the position one horizon later.

@@ -251,7 +251,7 @@ proto::Model proto_of(const BristleModel& m, const BristleEffects& on) {
   model.mutable_motion()->set_straight_speed_mm_s(m.speed_mm_s);
   model.mutable_motion()->set_bias_mean_mm_s(0);
   model.mutable_motion()->set_bias_sd_mm_s(0);
-  model.mutable_motion()->set_effects_limit_mm_s(std::max(50.0, 2 * m.speed_mm_s));
+  model.mutable_motion()->set_effects_limit_mm_s(effects_limit_mm_s(m.speed_mm_s));
   if (has(BristleEffect::kSense)) {
     proto::Effect& effect = *model.add_effect();
     effect.set_name(kEffects[0].name);

@@ -59,11 +59,11 @@ class Sensitivities {
     const Rates& r = record.rates;
     const Arc& arc = record.arc;
     const double h = record.h_s, base = model_.base.wheel_base_mm;
-    const double by_heading_x = -(arc.dy_mm - r.world_y_mm_s * h), by_heading_y = arc.dx_mm - r.world_x_mm_s * h;
+    const double by_heading_x = -(arc.dy_mm - r.drift_y_mm_s * h), by_heading_y = arc.dx_mm - r.drift_x_mm_s * h;
     add_row({by_heading_x, by_heading_y, 0}, pose_.row(2).data(), all_, pose_, 0);
     last_ = record.middle;
     in_contact_.step(record);
-    const double forward = (r.left_mm_s + r.right_mm_s) / 2 * h;
+    const double forward = r.forward_mm_s() * h;
     const Eigen::Vector3d turn = h * Eigen::Vector3d(-arc.along_y * forward / 2, arc.along_x * forward / 2, 1);
     const Eigen::Vector3d ahead = h * Eigen::Vector3d(arc.along_x, arc.along_y, 0);
     const Eigen::Vector3d sideways = h * Eigen::Vector3d(-arc.along_y, arc.along_x, 0);
@@ -74,7 +74,7 @@ class Sensitivities {
       if (commands.command == Motion::kStraight) pose_.col(kStraightSpeed) += by_left + by_right;
       if (commands.command == Motion::kLeft) pose_.col(kTurnSpeed) += by_right;
       if (commands.command == Motion::kRight) pose_.col(kTurnSpeed) += by_left;
-      pose_.col(kWheelBase) -= turn * ((r.right_mm_s - r.left_mm_s) / (base * base));
+      pose_.col(kWheelBase) -= turn * (((r.right_mm_s - r.left_mm_s) / base - r.turn_effects_rad_s) / base);
       pose_.col(columns_) += by_left;
       pose_.col(columns_ + 1) += by_right;
     }
@@ -98,16 +98,7 @@ class Sensitivities {
       // Gains are factors: a term's columns do not act on the term's own gain.
       Wheels without = replaced;
       if (b < own_.size()) {
-        const Eigen::Map<const Eigen::VectorXd> own(own_[b].coefficients, n);
-        const auto factor = [&](const double* values) {
-          const double gain = 1 + own.dot(Eigen::Map<const Eigen::VectorXd>(values, n));
-          constexpr double kLeast = 0.05;
-          return std::abs(gain) < kLeast ? kLeast : gain;
-        };
-        without = {};
-        if (block.target == Target::kGain || block.target == Target::kGainLeft) without.left = factor(of_left_);
-        if (block.target == Target::kGain || block.target == Target::kGainRight)
-          without.right = factor(right_values);
+        without = own_gains(b, of_left_, right_values);
         if (own_[b].replaced) {
           replaced.left *= without.left;
           replaced.right *= without.right;
@@ -220,6 +211,20 @@ class Sensitivities {
     double left = 1, right = 1;
   };
 
+  /// The gains of a block of the model itself, where it acts on gains; else 1. Not near 0: they are divisors.
+  [[nodiscard]] Wheels own_gains(std::size_t b, const double* left, const double* right) const {
+    const Block& block = blocks_[b];
+    const Eigen::Map<const Eigen::VectorXd> own(own_[b].coefficients,
+                                                static_cast<Eigen::Index>(block.basis.size()));
+    const auto factor = [&](const double* values) {
+      const double gain = 1 + own.dot(Eigen::Map<const Eigen::VectorXd>(values, own.size()));
+      constexpr double kLeast = 0.05;
+      return std::abs(gain) < kLeast ? kLeast : gain;
+    };
+    const bool both = block.target == Target::kGain;
+    return {both || block.target == Target::kGainLeft ? factor(left) : 1,
+            both || block.target == Target::kGainRight ? factor(right) : 1};
+  }
   /// At the start the robot is at its measured position for any coefficients, so the measurement effect moves the
   /// pose.
   void place(const Sample& sample, const Eigen::Vector3d& pose, const Eigen::Matrix2d& by_place) {

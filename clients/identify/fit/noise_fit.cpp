@@ -94,8 +94,8 @@ class Recorder {
     now_.spread[kDrift](1, 1) += h;
     now_.more(2, 2) += TrackFilter::kLeastTurn_rad2_s * h;
     if (!record.middle.commands.driven()) return;
-    const Eigen::Vector2d speeds(record.rates.left_mm_s, record.rates.right_mm_s);
-    now_.spread[kFactor] += ways.by_wheel * (h * speeds.cwiseAbs2()).asDiagonal() * ways.by_wheel.transpose();
+    now_.spread[kFactor] +=
+        ways.by_wheel * (h * record.rates.driven_mm_s().cwiseAbs2()).asDiagonal() * ways.by_wheel.transpose();
     now_.spread[kWheel] += h * ways.by_wheel * ways.by_wheel.transpose();
     now_.spread[kHeading](2, 2) += h;
   }

@@ -4,6 +4,8 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "core/stats/distributions.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -19,8 +21,8 @@ constexpr double kFar = 60;
 StepJacobian step_jacobian(const StepRecord& record, double wheel_base_mm) {
   const Arc& arc = record.arc;
   const double h = record.h_s;
-  const double world_x = record.rates.world_x_mm_s * h, world_y = record.rates.world_y_mm_s * h;
-  const double forward = (record.rates.left_mm_s + record.rates.right_mm_s) / 2 * h;
+  const double world_x = record.rates.drift_x_mm_s * h, world_y = record.rates.drift_y_mm_s * h;
+  const double forward = record.rates.forward_mm_s() * h;
   // A turn within the step also changes the direction of the rest of the step.
   const double bend_x = -arc.along_y * forward / 2, bend_y = arc.along_x * forward / 2;
   StepJacobian ways;
@@ -152,8 +154,7 @@ void TrackFilter::apply_wall(Eigen::Index axis, double wall_mm, double outwards)
   const double sd = std::sqrt(std::max(variance, 1e-6));
   constexpr double kNever = 4;  // standard deviations
   if (beyond < -kNever * sd) return;
-  const double inside = 0.5 * std::erfc(beyond / sd * M_SQRT1_2);
-  const double density = std::exp(-0.5 * beyond * beyond / (sd * sd)) / std::sqrt(2 * M_PI);
+  const double inside = stats::normal_cdf(-beyond / sd), density = stats::normal_pdf(beyond / sd);
   const double mean = beyond * inside - sd * density;
   const double square = (beyond * beyond + sd * sd) * inside - beyond * sd * density;
   const State with_all = p.col(axis) + by_heading * p.col(2);
@@ -188,9 +189,8 @@ void TrackFilter::propagate_covariance(const StepRecord& record) {
   p.col(1) += by_heading[1] * p.col(2);
   if (biased) p.leftCols<3>() += p.rightCols<2>() * by_bias.transpose();
   if (record.middle.commands.driven()) {
-    const double left = record.rates.left_mm_s, right = record.rates.right_mm_s;
-    const Eigen::Vector2d wheels(h * (noise.factor_s * left * left + noise.wheel_mm2_s),
-                                 h * (noise.factor_s * right * right + noise.wheel_mm2_s));
+    const Eigen::Vector2d wheels =
+        h * (noise.factor_s * record.rates.driven_mm_s().cwiseAbs2().array() + noise.wheel_mm2_s);
     p.topLeftCorner<3, 3>() += by_wheel * wheels.asDiagonal() * by_wheel.transpose();
   }
   if (!forecasting_) {
@@ -207,13 +207,13 @@ void TrackFilter::step_mean(double time_s, double h_s, const CommandState& comma
   const StepRecord record = step_freely(time_s, h_s, commands, near);
   // For a normal heading of variance P, E[cos] = cos exp(-P / 2). The covariance of speed and heading shifts the
   // mean.
-  const double forward = (record.rates.left_mm_s + record.rates.right_mm_s) / 2 + record.rates.ahead_mm_s;
+  const double forward = record.rates.forward_mm_s();
   const double shrink = std::exp(-p(2, 2) / 2);
   const double together = (record.rates.left_gain * p(2, 3) + record.rates.right_gain * p(2, 4)) / 2;
   const double cx = record.arc.along_x * shrink, cy = record.arc.along_y * shrink;
   const Rates& r = record.rates;
-  belief_.mean[0] = before[0] + h_s * (forward * cx - together * cy - r.sideways_mm_s * cy + r.world_x_mm_s);
-  belief_.mean[1] = before[1] + h_s * (forward * cy + together * cx + r.sideways_mm_s * cx + r.world_y_mm_s);
+  belief_.mean[0] = before[0] + h_s * (forward * cx - together * cy - r.sideways_mm_s * cy + r.drift_x_mm_s);
+  belief_.mean[1] = before[1] + h_s * (forward * cy + together * cx + r.sideways_mm_s * cx + r.drift_y_mm_s);
   apply_walls();
 }
 

@@ -13,9 +13,16 @@ using proto::Effect, proto::Function;
 
 SingleRobot::SingleRobot(const Floor& floor, const FloorSettings& settings) : floor_(floor), settings_(settings) {
   for (const Effect& effect : settings.model.effect()) {
-    Term term{
-        effect.acts_on(), effect.wheel() != Effect::RIGHT_WHEEL, effect.wheel() != Effect::LEFT_WHEEL, 1, 0, 0, {}};
-    kt_sincos(effect.direction_deg() * kPi / 180, &term.across, &term.along);
+    const bool is_gain = effect.acts_on() == Effect::WHEEL_GAIN;
+    const bool left = effect.wheel() != Effect::RIGHT_WHEEL, right = effect.wheel() != Effect::LEFT_WHEEL;
+    double along, across;
+    kt_sincos(effect.direction_deg() * kPi / 180, &across, &along);
+    Term term{is_gain && left,
+              is_gain && right,
+              unit_offsets(static_cast<EffectSettings::Target>(effect.acts_on()), left, right, along, across,
+                           settings.model.motion().wheel_base_mm()),
+              0,
+              {}};
     for (const int command : effect.during())
       term.commands = static_cast<std::uint8_t>(term.commands | 1u << command);
     if (effect.during_size() == 0) term.commands = 0xe;
@@ -120,39 +127,15 @@ void SingleRobot::step(RobotState& state, std::int64_t k, Dice& dice, double nei
   double right = driven.straight * base.straight_speed_mm_s() + driven.left * base.turn_speed_mm_s();
   left = (left + state.bias_left_mm_s) * (1 + spread * dice.normal());
   right = (right + state.bias_right_mm_s) * (1 + spread * dice.normal());
-  double left_gain = 1, right_gain = 1, left_more = 0, right_more = 0, sideways = 0, drift_x = 0, drift_y = 0;
-  const double half_base = base.wheel_base_mm() / 2;
+  MotionChange change;
   for (const Term& term : terms_) {
     const double value = value_of(term, state, static_cast<double>(k) * kStep_s, neighbours, dice);
-    if (value == 0) continue;
-    switch (term.target) {
-      case Effect::WHEEL_GAIN:
-        left_gain *= term.left ? 1 + value : 1;
-        right_gain *= term.right ? 1 + value : 1;
-        break;
-      case Effect::WHEEL_OFFSET:
-        left_more += term.left ? value : 0;
-        right_more += term.right ? value : 0;
-        break;
-      case Effect::TURN_RATE:
-        left_more -= value * half_base;
-        right_more += value * half_base;
-        break;
-      case Effect::BODY_DRIFT:
-        left_more += value * term.along;
-        right_more += value * term.along;
-        sideways += value * term.across;
-        break;
-      case Effect::WORLD_DRIFT:
-        drift_x += value * term.along;
-        drift_y += value * term.across;
-        break;
-      default: break;
-    }
+    if (term.left_gain) change.left_gain *= 1 + value;
+    if (term.right_gain) change.right_gain *= 1 + value;
+    term.unit.add_to(change, value);
   }
-  left = left * left_gain + left_more;
-  right = right * right_gain + right_more;
-  const double turn_rad = (right - left) / base.wheel_base_mm() * kStep_s;
+  const DriveSpeeds speeds = changed_speeds(left, right, change, base.effects_limit_mm_s());
+  const double turn_rad = (speeds.right_mm_s - speeds.left_mm_s) / base.wheel_base_mm() * kStep_s;
   // Second-order midpoint step: half of the turn before the displacement, half after. The reference point lies
   // behind the centre.
   double s, c, s1, c1, s2, c2;
@@ -160,9 +143,10 @@ void SingleRobot::step(RobotState& state, std::int64_t k, Dice& dice, double nei
   kt_sincos(state.heading_rad + turn_rad / 2, &s1, &c1);
   state.heading_rad = wrapped(state.heading_rad + turn_rad);
   kt_sincos(state.heading_rad, &s2, &c2);
-  const double way = (left + right) / 2 * kStep_s, across = sideways * kStep_s, offset = base.axle_offset_mm();
-  state.x_mm += c1 * way - s1 * across + drift_x * kStep_s + offset * (c2 - c);
-  state.y_mm += s1 * way + c1 * across + drift_y * kStep_s + offset * (s2 - s);
+  const double way = (speeds.left_mm_s + speeds.right_mm_s) / 2 * kStep_s, across = speeds.sideways_mm_s * kStep_s;
+  const double offset = base.axle_offset_mm();
+  state.x_mm += c1 * way - s1 * across + speeds.drift_x_mm_s * kStep_s + offset * (c2 - c);
+  state.y_mm += s1 * way + c1 * across + speeds.drift_y_mm_s * kStep_s + offset * (s2 - s);
   keep_inside(state);
   remember(state, dice);
 }

@@ -8,6 +8,7 @@
 
 #include "clients/identify/kilogrid/floor_model.hpp"
 #include "core/effects/function.hpp"
+#include "core/effects/motion_change.hpp"
 
 namespace kilotwin::kilogrid {
 
@@ -50,9 +51,8 @@ class SingleRobot {
     double apart_s, scale_s, tail, longest_s;
   };
   struct Term {
-    proto::Effect::Target target;
-    bool left, right;
-    double along, across;
+    bool left_gain, right_gain;  ///< the wheels on whose gain it acts
+    UnitOffsets unit;
     std::uint8_t commands;
     std::vector<Factor> factors;
   };

@@ -44,11 +44,56 @@ Eigen::Vector2d nominal_speeds(const BaseParameters& base, Motion motion) {
 }
 
 namespace {
-/// Weighted sum of a block's columns.
-double sum_of(const std::array<double, kMostColumns>& columns, const Term& term, Eigen::Index first,
-              Eigen::Index n) {
-  return Eigen::Map<const Eigen::VectorXd>(columns.data(), n).dot(term.coefficients.segment(first, n));
+
+/// Calls take(block, sum) for the blocks that act under a command: those of the measurement model, or of the motion model.
+/// sum(situation, wheel): the weighted sum of the block's columns.
+template <class Take>
+void for_each_block(const std::vector<Term>& terms, Motion command, bool measured, Take&& take) {
+  std::array<double, kMostColumns> columns;
+  for (const Term& term : terms) {
+    const double* coefficients = term.coefficients.data();
+    for (const Block& block : term.blocks) {
+      const auto n = static_cast<Eigen::Index>(block.basis.size());
+      const Eigen::Map<const Eigen::VectorXd> own(coefficients, n);
+      coefficients += n;
+      if (is_measured(block.target) != measured || (block.during >> static_cast<int>(command) & 1) == 0) continue;
+      take(block, [&](const Situation& s, std::size_t wheel) {
+        block.basis.evaluate(s, wheel, columns.data());
+        return Eigen::Map<const Eigen::VectorXd>(columns.data(), n).dot(own);
+      });
+    }
+  }
 }
+
+/// Adds the values of a block at the left and the right wheel. They are equal unless the block is per wheel.
+void add(const Block& block, double left, double right, double wheel_base_mm, MotionChange& change, Rates& rates) {
+  using Kind = EffectSettings::Target;
+  const auto offset = [&](Kind kind, double along, double across) {
+    unit_offsets(kind, true, true, along, across, wheel_base_mm).add_to(change, left);
+  };
+  switch (block.target) {
+    case Target::kGain:
+      change.left_gain *= 1 + left;
+      change.right_gain *= 1 + right;
+      break;
+    case Target::kGainLeft: change.left_gain *= 1 + left; break;
+    case Target::kGainRight: change.right_gain *= 1 + right; break;
+    case Target::kOffset:
+      change.left_mm_s += left;
+      change.right_mm_s += right;
+      break;
+    case Target::kTurn:
+      rates.turn_effects_rad_s += left;
+      offset(Kind::kTurnRate, 0, 0);
+      break;
+    case Target::kAhead: offset(Kind::kBodyDrift, 1, 0); break;
+    case Target::kSideways: offset(Kind::kBodyDrift, 0, 1); break;
+    case Target::kWorldX: offset(Kind::kWorldDrift, 1, 0); break;
+    case Target::kWorldY: offset(Kind::kWorldDrift, 0, 1); break;
+    default: break;
+  }
+}
+
 }  // namespace
 
 Rates MotionModel::rates(const Situation& s, const Eigen::Vector2d& bias_mm_s) const {
@@ -58,48 +103,14 @@ Rates MotionModel::rates(const Situation& s, const Eigen::Vector2d& bias_mm_s) c
     r.left_base_mm_s = v[0];
     r.right_base_mm_s = v[1];
   }
-  double left_offset = 0, right_offset = 0;
-  std::array<double, kMostColumns> left, right;
-  for (const Term& term : terms) {
-    Eigen::Index c = 0;
-    for (const Block& block : term.blocks) {
-      const auto n = static_cast<Eigen::Index>(block.basis.size());
-      const Eigen::Index first = c;
-      c += n;
-      if (is_measured(block.target) || (block.during >> static_cast<int>(s.commands.command) & 1) == 0) continue;
-      block.basis.evaluate(s, 0, left.data());
-      const double l = sum_of(left, term, first, n);
-      const auto of_right = [&] {
-        if (!block.basis.per_wheel()) return l;
-        block.basis.evaluate(s, 1, right.data());
-        return sum_of(right, term, first, n);
-      };
-      switch (block.target) {
-        case Target::kGain:
-        case Target::kOffset: {
-          const double w = of_right();
-          if (block.target == Target::kGain) {
-            r.left_gain *= 1 + l;
-            r.right_gain *= 1 + w;
-          } else {
-            left_offset += l;
-            right_offset += w;
-          }
-          break;
-        }
-        case Target::kGainLeft: r.left_gain *= 1 + l; break;
-        case Target::kGainRight: r.right_gain *= 1 + of_right(); break;
-        case Target::kTurn: r.turn_rad_s += l; break;
-        case Target::kAhead: r.ahead_mm_s += l; break;
-        case Target::kSideways: r.sideways_mm_s += l; break;
-        case Target::kWorldX: r.world_x_mm_s += l; break;
-        case Target::kWorldY: r.world_y_mm_s += l; break;
-        default: break;
-      }
-    }
-  }
-  r.left_mm_s = r.left_base_mm_s * r.left_gain + left_offset;
-  r.right_mm_s = r.right_base_mm_s * r.right_gain + right_offset;
+  MotionChange change;
+  for_each_block(terms, s.commands.command, false, [&](const Block& block, const auto& sum) {
+    const double left = sum(s, 0);
+    add(block, left, block.basis.per_wheel() ? sum(s, 1) : left, base.wheel_base_mm, change, r);
+  });
+  static_cast<DriveSpeeds&>(r) = changed_speeds(r.left_base_mm_s, r.right_base_mm_s, change, kEffectsLimit_mm_s);
+  r.left_gain = change.left_gain;
+  r.right_gain = change.right_gain;
   return r;
 }
 
@@ -126,28 +137,18 @@ Eigen::Vector3d MotionModel::measured(double x_mm, double y_mm, double heading_r
     there.x_mm = x_mm + base.centre_mm * c;
     there.y_mm = y_mm + base.centre_mm * s;
     there.heading_rad = heading_rad;
-    std::array<double, kMostColumns> values;
-    for (const Term& term : terms) {
-      Eigen::Index c0 = 0;
-      for (const Block& block : term.blocks) {
-        const auto n = static_cast<Eigen::Index>(block.basis.size());
-        const Eigen::Index first = c0;
-        c0 += n;
-        if (!is_measured(block.target) || (block.during >> static_cast<int>(at.commands.command) & 1) == 0)
-          continue;
-        block.basis.evaluate(there, 0, values.data());
-        const double v = sum_of(values, term, first, n);
-        switch (block.target) {
-          case Target::kMeasuredX: x += v; break;
-          case Target::kMeasuredY: y += v; break;
-          case Target::kMeasuredAhead: ahead += v; break;
-          case Target::kMeasuredLeft: left += v; break;
-          case Target::kMeasuredScale: scale *= 1 + v; break;
-          case Target::kMeasuredTurn: picture += v; break;
-          default: turn += v; break;
-        }
+    for_each_block(terms, at.commands.command, true, [&](const Block& block, const auto& sum) {
+      const double v = sum(there, 0);
+      switch (block.target) {
+        case Target::kMeasuredX: x += v; break;
+        case Target::kMeasuredY: y += v; break;
+        case Target::kMeasuredAhead: ahead += v; break;
+        case Target::kMeasuredLeft: left += v; break;
+        case Target::kMeasuredScale: scale *= 1 + v; break;
+        case Target::kMeasuredTurn: picture += v; break;
+        default: turn += v; break;
       }
-    }
+    });
   }
   const double point_x = x_mm + ahead * c - left * s, point_y = y_mm + ahead * s + left * c;
   return {point_x * scale - point_y * picture + x, point_y * scale + point_x * picture + y,
@@ -168,16 +169,15 @@ Eigen::Vector3d MotionModel::pose_of(const Sample& sample, const Situation& at) 
 }
 
 Arc arc_of(const Rates& r, double wheel_base_mm, double heading_rad, double h_s) {
-  const double turn = (r.right_mm_s - r.left_mm_s) / wheel_base_mm + r.turn_rad_s;
-  const double forward = (r.left_mm_s + r.right_mm_s) / 2 + r.ahead_mm_s;
+  const double turn = (r.right_mm_s - r.left_mm_s) / wheel_base_mm, forward = r.forward_mm_s();
   // sin(half) / half. The series is exact to the last digit at small angles, as in nearly all steps.
   const double half = turn * h_s / 2, half2 = half * half;
   constexpr double kLittle_rad = 0.06;
   const double shorter =
       std::abs(half) < kLittle_rad ? 1 - half2 / 6 * (1 - half2 / 20 * (1 - half2 / 42)) : std::sin(half) / half;
   const double c = std::cos(heading_rad + half) * shorter, s = std::sin(heading_rad + half) * shorter;
-  return {h_s * (forward * c - r.sideways_mm_s * s + r.world_x_mm_s),
-          h_s * (forward * s + r.sideways_mm_s * c + r.world_y_mm_s), turn * h_s, c, s};
+  return {h_s * (forward * c - r.sideways_mm_s * s + r.drift_x_mm_s),
+          h_s * (forward * s + r.sideways_mm_s * c + r.drift_y_mm_s), turn * h_s, c, s};
 }
 
 }  // namespace kilotwin::identify

@@ -12,6 +12,7 @@
 #include "clients/identify/model/basis.hpp"
 #include "clients/identify/model/contact_geometry.hpp"
 #include "clients/identify/model/traffic_grid.hpp"
+#include "core/effects/motion_change.hpp"
 
 namespace kilotwin::identify {
 
@@ -93,14 +94,21 @@ struct Term {
 /// Whether the term is a map of camera distortion.
 [[nodiscard]] bool is_camera_map(const Term&);
 
-/// Speeds of a robot at one instant.
-struct Rates {
-  double left_mm_s = 0, right_mm_s = 0;            ///< of the wheels, effects included
+/// Limit of effects on a speed (core/effects/motion_change.hpp). Default of Motion.effects_limit_mm_s in idl/model.proto.
+inline constexpr double kEffectsLimit_mm_s = 50;
+
+/// Speeds of a robot at one instant: effects included, and what derivatives need of their parts.
+struct Rates : DriveSpeeds {
   double left_base_mm_s = 0, right_base_mm_s = 0;  ///< v + b, without effects
   double left_gain = 1, right_gain = 1;
-  double turn_rad_s = 0;  ///< in addition to the turn rate of the wheels
-  double ahead_mm_s = 0, sideways_mm_s = 0;
-  double world_x_mm_s = 0, world_y_mm_s = 0;
+  double turn_effects_rad_s = 0;  ///< turn rate by effects that state one; independent of the wheel base
+
+  /// Speed of the reference point along the heading.
+  [[nodiscard]] double forward_mm_s() const { return (left_mm_s + right_mm_s) / 2; }
+  /// Speeds of the wheels by the motors, with gains. Factor noise is relative to these.
+  [[nodiscard]] Eigen::Vector2d driven_mm_s() const {
+    return {left_base_mm_s * left_gain, right_base_mm_s * right_gain};
+  }
 };
 
 struct MotionModel {

@@ -57,7 +57,7 @@ MeasuredSet played(std::uint64_t seed, const std::function<double(double time_s,
         Rates rates;
         rates.left_mm_s = v[0] * (1 + sd * noise(Stream::kWheelFactor, 0));
         rates.right_mm_s = v[1] * (1 + sd * noise(Stream::kWheelFactor, 1));
-        rates.world_x_mm_s = push_x_mm_s(t, motion != Motion::kStop);
+        rates.drift_x_mm_s = push_x_mm_s(t, motion != Motion::kStop);
         const Arc arc = arc_of(rates, 25, heading, dt);
         x += arc.dx_mm;
         y += arc.dy_mm;

@@ -227,8 +227,7 @@ TEST(Place, TheDirectionOfNeighboursIsRecovered) {
     Situation s = driven_at(0, 0);
     s.heading_rad = heading_rad;
     s.near = view_of(0, x, y, &list);
-    const Rates r = model.rates(s, {0, 0});
-    return (r.left_mm_s + r.right_mm_s) / 2 + r.ahead_mm_s;
+    return model.rates(s, {0, 0}).forward_mm_s();
   };
   const double alone = gain({}, 0);
   EXPECT_NEAR(gain({80}, 0) / alone, 1 / 1.7, 0.06);

@@ -62,7 +62,7 @@ MeasuredSet played(const TargetGroup& acting, std::uint64_t seed, std::uint32_t 
       Rates rates;
       rates.left_mm_s = acting.left(left_s) * v[0] * (1 + sd * noise(Stream::kWheelFactor, 0));
       rates.right_mm_s = acting.right(right_s) * v[1] * (1 + sd * noise(Stream::kWheelFactor, 1));
-      rates.world_x_mm_s = acting.drift_x_mm_s(t);
+      rates.drift_x_mm_s = acting.drift_x_mm_s(t);
       const Arc arc = arc_of(rates, 25, heading, dt);
       x += arc.dx_mm;
       y += arc.dy_mm;
