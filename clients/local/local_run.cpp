@@ -130,6 +130,11 @@ class LocalRun {
     totals.state_hash = chain;
     totals.stopped_early = schedule_.stopped_early();
     totals.lateness = lateness.totals();
+    try {
+      flush_logs();
+    } catch (const RunError& error) {
+      if (totals.failure.empty()) totals.failure = error.what();
+    }
     if (totals.failure.empty()) snapshots_.remove_all();
     if (!options_.run_directory.empty()) {
       for (std::uint32_t h = 0; h < plan_.hosts; ++h)
@@ -150,7 +155,7 @@ class LocalRun {
     });
   }
 
-  /// What hosts, radio and station observed: in the step to `now`, and at it.
+  /// Hands on the observations of hosts, radio and station: those in the step to `now`, and those at it.
   void observe(Tick now) {
     for (behaviours::HostObserver& host : host_observers_) {
       if (now > first_) host.stepped(now - 1, observed_);
@@ -169,6 +174,11 @@ class LocalRun {
     if (!options_.tracker_samples) return;
     tracker_samples_ = options_.tracker_samples(tick);
     for (const TrackerSample& sample : tracker_samples_) observer_.tracker_sample(tick, sample);
+  }
+
+  void flush_logs() {
+    for (const auto& logs : logs_) logs->flush();
+    if (engines_.radio().firmware() != nullptr) engines_.radio().firmware()->flush_logs();
   }
 
   static std::uint64_t ns(Clock::time_point from, Clock::time_point to) {
@@ -204,7 +214,7 @@ class LocalRun {
   void save(Tick now, std::uint64_t chain) {
     observer_.saved();
     // A run that resumes from this checkpoint keeps the lines printed before it, so the files must hold them.
-    for (const auto& logs : logs_) logs->flush();
+    flush_logs();
     for (std::uint32_t task = 0; task < plan_.federates(); ++task) {
       proto::CheckpointPart part;
       engines_.save(task, part);

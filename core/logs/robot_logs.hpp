@@ -25,12 +25,14 @@ class RobotLogs {
             const std::function<bool(std::uint32_t robot)>& own);
   RobotLogs(const RobotLogs&) = delete;
   RobotLogs& operator=(const RobotLogs&) = delete;
-  /// Writes the text that waits. Prints an error to stderr, because a destructor cannot throw.
+  /// Writes the text that waits, for runs that an exception ends. Prints an error to stderr, because a destructor cannot throw.
   ~RobotLogs();
 
   /// Adds text that the robot printed in the step from tick `from`. The text reaches the file after at most one second of
   /// simulated time, earlier if 4 KiB wait. Throws RunError if a file cannot be written.
   void write(Tick from, std::uint32_t robot, std::string_view text);
+  /// Writes the text that waits. To be called at each checkpoint and at the end of the run. Opens and closes each file that has
+  /// text: a run may have more robots than a process may have open files. Throws RunError if a file cannot be written.
   void flush();
 
   /// A robot's file in a run directory.

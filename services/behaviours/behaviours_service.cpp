@@ -75,7 +75,9 @@ class BehavioursFederate : public Federate {
   void count(WireMetrics& metrics, bool last) override {
     metrics.robots_failed = engine_.robots_failed();
     lend_observations(observed_, octets_, metrics);
-    if (last) write_eeproms(engine_, session_.plan().share(host_), context_.run_directory);
+    if (!last) return;
+    logs_.flush();
+    write_eeproms(engine_, session_.plan().share(host_), context_.run_directory);
   }
 
  private:

@@ -60,6 +60,8 @@ class FirmwareRobots {
   }
   /// Voltage of robot i's battery, V. Called only if the experiment has batteries.
   [[nodiscard]] virtual double battery_V(std::uint32_t i) const { return static_cast<void>(i), 0; }
+  /// Writes the text that robots have printed and that waits. Throws RunError if a file cannot be written.
+  virtual void flush_logs() const {}
   /// Digest of the robot's state, for the state hash.
   [[nodiscard]] virtual std::uint64_t word(std::uint32_t i) const = 0;
   [[nodiscard]] virtual std::string save(std::uint32_t i) const = 0;

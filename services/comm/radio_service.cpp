@@ -54,6 +54,7 @@ class CommFederate : public Federate {
     metrics.collided = counters.collided;
     lend_observations(observed_, octets_, metrics);
     if (!last) return;
+    if (engine_.firmware() != nullptr) engine_.firmware()->flush_logs();
     for (const PairCount& pair : engine_.pair_counts()) {
       receiver_.push_back(pair.receiver);
       sender_.push_back(pair.sender);
@@ -91,7 +92,7 @@ class CommFederate : public Federate {
   std::vector<std::unique_ptr<Output<RadioFrame>>> radio_out_;
   RadioObserver observer_{session_.plan(), engine_};
   proto::Observations observed_;  // since the last metrics sample
-  // What the last metrics sample points to.
+  // The data to which the last metrics sample points.
   std::string octets_;
   std::vector<std::uint32_t> receiver_, sender_, count_;
   std::vector<std::uint32_t> attempted_, robot_sent_, received_, collided_, backed_off_;

@@ -4,7 +4,9 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <memory>
 
+#include "core/dds/dds.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::test {
@@ -54,6 +56,38 @@ TEST(Printing, IsTheSameInOneProcessAndInMany) {
     EXPECT_NE(text.find("heard "), std::string::npos) << name;
   }
   EXPECT_EQ(local, with({"--hosts", "3", "--partitions", "2x1"}, "federated"));
+}
+
+TEST(Printing, TextThatWaitsAtTheEndIsWrittenOrFailsTheRun) {
+  // Each robot prints once, at the start. The text waits until the end of the run, because nothing is printed later.
+  const Scratch scratch;
+  write(scratch.path() / "once.c",
+        "#define DEBUG\n#include <kilolib.h>\n#include <debug.h>\n"
+        "static void setup(void) { printf(\"ready\\n\"); }\nstatic void loop(void) {}\n"
+        "int main(void) { kilo_init(); debug_init(); kilo_start(setup, loop); return 0; }\n");
+  for (const std::string kind : {"native", "avr"}) {
+    SCOPED_TRACE(kind);
+    write(scratch.path() / (kind + ".txtpb"), "duration_s: 0.3 robots { count: 1 behaviour: \"once.c\" avr: " +
+                                                  std::string(kind == "avr" ? "true" : "false") + " layout {} }\n");
+    const std::string run = scratch / kind;
+    const Outcome prepared = kilotwin({"run", scratch / (kind + ".txtpb"), "--prepare", "--out", run}, scratch);
+    ASSERT_EQ(prepared.status, 0) << prepared.err;
+    write(run + "/logs", "a file in place of the folder");
+    const std::string domain = std::to_string(dds::DomainClaim::any().domain());
+    const auto service = [&](const std::string& name, Words more) {
+      fs::create_directories(scratch.path() / (kind + name));
+      Words words{program(), "service", name, "--run", run, "--domain", domain};
+      words.insert(words.end(), more.begin(), more.end());
+      return std::make_unique<Process>(words, scratch.path() / (kind + name));
+    };
+    const auto physics = service("physics", {"--partition", "0,0"}),
+               behaviours = service("behaviours", {"--share", "1/1"}), radio = service("radio", {}),
+               station = service("station", {});
+    const Outcome outcome = (kind == "avr" ? radio : behaviours)->wait();
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_NE(outcome.err.find("logs/robot-00000.txt: cannot be created"), std::string::npos) << outcome.err;
+    EXPECT_EQ(station->wait().status, 1) << "the run has failed";
+  }
 }
 
 }  // namespace

@@ -224,20 +224,26 @@ TEST_F(Recoveries, SystemCallsFailTheirRobotAlone) {
 }
 
 TEST_F(Recoveries, AKilledWorkerFailsNoRobot) {
-  Process process({program(), "run", source("experiments/disperse.txtpb"), "--mode", "local", "--duration", "600",
-                   "--pace", "1", "--out", scratch / "run"},
-                  scratch.path());
-  const auto worker = [&]() -> pid_t {
-    for (const pid_t id : processes_with(scratch / "run")) {
-      if (id != process.id()) return id;
-    }
-    return -1;
-  };
-  ASSERT_TRUE(eventually([&] { return worker() > 0 && std::filesystem::exists(scratch / "run/recording.ktrec"); }));
-  kill(worker(), SIGKILL);
-  const Outcome outcome = process.wait(30);
-  EXPECT_EQ(outcome.status, 1);
-  EXPECT_NE(outcome.err.find("signal 9"), std::string::npos) << outcome.err;
+  // Four hosts on four threads: when the first signal arrives at one thread, the others run programs until the process ends.
+  for (const std::vector<int>& signals : {std::vector{SIGKILL}, std::vector{SIGABRT, SIGABRT}}) {
+    const std::string run = scratch / ("run" + std::to_string(signals.size()));
+    Process process({program(), "run", source("experiments/disperse.txtpb"), "--mode", "local", "--duration",
+                     "100000", "--pace", "max", "--hosts", "4", "--threads", "4", "--out", run},
+                    scratch.path());
+    const auto worker = [&]() -> pid_t {
+      for (const pid_t id : processes_with(run)) {
+        if (id != process.id()) return id;
+      }
+      return -1;
+    };
+    ASSERT_TRUE(eventually([&] { return worker() > 0 && std::filesystem::exists(run + "/recording.ktrec"); }));
+    const pid_t id = worker();
+    for (const int signal : signals) kill(id, signal);
+    const Outcome outcome = process.wait(60);
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_NE(outcome.err.find("signal " + std::to_string(signals[0])), std::string::npos) << outcome.err;
+    EXPECT_EQ(outcome.err.find("crashed"), std::string::npos) << outcome.err;
+  }
 }
 
 }  // namespace

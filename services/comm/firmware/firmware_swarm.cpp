@@ -62,7 +62,7 @@ FirmwareSwarm::FirmwareSwarm(const RunPlan& plan, const fs::path& run_directory,
   if (keeps_logs)
     logs_.emplace(run_directory, plan.tick_length, first,
                   [&plan](std::uint32_t robot) { return plan.firmware(robot); });
-  // What they print while they are switched on belongs to the run's beginning.
+  // The text that they print while they are switched on belongs to the run's beginning.
   if (first > Tick{0}) {
     for (Robot& robot : robots_) robot.mcu->printed().clear();
   }
@@ -174,7 +174,7 @@ void FirmwareSwarm::use_battery(std::uint32_t i) {
   robot.shown_left = robot.shown_right = robot.spin_up = 0;
 }
 
-/// What a robot has printed since the last commit.
+/// Writes the text that the robot has printed since the last commit.
 void FirmwareSwarm::write_log(std::uint32_t i) {
   std::string& printed = robots_[i].mcu->printed();
   if (printed.empty()) return;
@@ -213,9 +213,12 @@ std::uint64_t FirmwareSwarm::word(std::uint32_t i) const {
   return senses_.has_batteries() ? hash_mix(word, static_cast<std::uint64_t>(senses_.charge(ids_[i]))) : word;
 }
 
-std::string FirmwareSwarm::save(std::uint32_t i) const {
-  // Who goes on from this checkpoint finds what was printed before it.
+void FirmwareSwarm::flush_logs() const {
   if (logs_) logs_->flush();
+}
+
+std::string FirmwareSwarm::save(std::uint32_t i) const {
+  flush_logs();  // a run that resumes from this checkpoint keeps the lines printed before it
   const Robot& robot = robots_[i];
   std::string board{robot.flat ? '\1' : '\0', static_cast<char>(robot.shown_left),
                     static_cast<char>(robot.shown_right), static_cast<char>(robot.spin_up)};

@@ -40,6 +40,7 @@ class FirmwareSwarm final : public comm::FirmwareRobots {
   [[nodiscard]] Outputs outputs(std::uint32_t i) const override;
   [[nodiscard]] bool read(std::uint32_t i, std::uint16_t address, std::span<std::uint8_t> to) const override;
   [[nodiscard]] double battery_V(std::uint32_t i) const override { return senses_.battery_V(ids_[i]); }
+  void flush_logs() const override;
   [[nodiscard]] std::uint64_t word(std::uint32_t i) const override;
   [[nodiscard]] std::string save(std::uint32_t i) const override;
   void load(std::uint32_t i, const std::string& octets) override;

@@ -65,7 +65,7 @@ constexpr std::uint32_t kBootSection = 0x7000;
 
 /// The program counter can name 128 KiB; the flash repeats there.
 constexpr std::uint32_t kProgramSpace = 128 * 1024;
-/// What an address of 16 bits can name. libsimavr writes there before it says that there is no memory.
+/// Number of addresses of 16 bits. libsimavr writes there before it says that there is no memory.
 constexpr std::uint32_t kDataSpace = 64 * 1024;
 
 /// Pins of port B that kilolib may pulse: its transmit mask.
@@ -160,7 +160,7 @@ Mcu::~Mcu() {
   std::free(avr_);
 }
 
-/// What the board holds at the pins: it is dark.
+/// Sets the pins to the levels that the board holds: it is dark.
 void Mcu::after_reset() {
   hold_charger();
   avr_raise_irq(comparator_[1], kThreshold_mV);

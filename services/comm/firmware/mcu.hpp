@@ -53,7 +53,7 @@ enum class Halt : std::uint8_t {
 
 class Mcu {
  public:
-  /// What executes instructions: libsimavr alone, or FastCore those that it knows. The results are equal.
+  /// The simulator of instructions: libsimavr alone, or FastCore for those that it knows. The results are equal.
   enum class Core : std::uint8_t { kFast, kLibsimavr };
   /// A robot that is switched on at cycle 0. The random stream of `robot` gives the noise of its converter.
   Mcu(const FlashImage&, const std::array<std::uint8_t, kEepromOctets>& eeprom, const Random&, std::uint32_t robot,

@@ -207,7 +207,7 @@ TEST_F(FirmwareRun, FailsAloneAndReportsIt) {
   EXPECT_GT(timeline.totals.sent, 15u);
 }
 
-TEST_F(FirmwareRun, ReadsWhatANativeRobotReads) {
+TEST_F(FirmwareRun, ReadsTheValuesOfANativeRobot) {
   // A robot's first duties show its reading in setup() at its start, while no message was arriving.
   const std::string reader = program(
       "reader.c",
@@ -260,6 +260,23 @@ TEST_F(FirmwareRun, AnEmptyBatterySwitchesItOff) {
   const double native = dark_at(""), firmware = dark_at("avr: true");
   EXPECT_GT(native, 300);
   EXPECT_NEAR(native, firmware, 5);
+}
+
+TEST_F(FirmwareRun, TextThatCannotBeWrittenAtTheEndFailsTheRun) {
+  // The text waits until the end of the run, because nothing is printed later.
+  const std::string prints = program("prints.c",
+                                     "#define DEBUG\n#include <kilolib.h>\n#include <debug.h>\n"
+                                     "static void setup(void) { printf(\"ready\\n\"); }\n"
+                                     "static void loop(void) {}\nint main(void) { kilo_init(); "
+                                     "debug_init(); kilo_start(setup, loop); return 0; }\n");
+  for (const char* avr : {"false", "true"}) {
+    const Timeline timeline =
+        run_timeline("duration_s: 0.3 robots { count: 1 " + prints + " avr: " + avr + " layout {} }\n",
+                     folder_ / std::to_string(runs_++), 1, {}, {},
+                     [](const fs::path& run) { std::ofstream(run / "logs") << "a file in place of the folder"; });
+    EXPECT_NE(timeline.totals.failure.find("logs/robot-00000.txt: cannot be created"), std::string::npos)
+        << avr << timeline.totals.failure;
+  }
 }
 
 TEST_F(FirmwareRun, ExchangesMessagesWithNativeRobots) {

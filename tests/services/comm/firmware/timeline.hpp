@@ -59,10 +59,12 @@ class TimelineObserver : public RunObserver {
   std::vector<double> x_mm_, y_mm_;  // of the last tick
 };
 
-/// Runs an experiment locally. `folder`: directory for the experiment and its run; `inputs`: external ones.
+/// Runs an experiment locally. `folder`: directory for the experiment and its run; `inputs`: external ones; `before`: called with
+/// the run directory before the run.
 inline Timeline run_timeline(const std::string& experiment, const std::filesystem::path& folder,
                              std::uint32_t threads = 1, const std::vector<std::string>& set = {},
-                             const std::vector<Directive>& inputs = {}) {
+                             const std::vector<Directive>& inputs = {},
+                             const std::function<void(const std::filesystem::path&)>& before = {}) {
   std::filesystem::create_directories(folder);
   const std::filesystem::path file = folder / "experiment.txtpb";
   std::ofstream(file) << experiment;
@@ -77,6 +79,7 @@ inline Timeline run_timeline(const std::string& experiment, const std::filesyste
   options.threads = threads;
   options.run_directory = prepared.directory.path();
   options.inputs = inputs;
+  if (before) before(options.run_directory);
   TimelineObserver observer(plan.robots());
   const auto programs = behaviours::ProgramSet::load(plan, options.run_directory);
   observer.timeline.totals = local::run(plan, programs, options, observer);
