@@ -112,7 +112,8 @@ Command add_control(CLI::App& program) {
       ->check(CLI::Range(-360.0, 360.0).description(""))
       ->capture_default_str()
       ->type_name("DEG");
-  app.add_option("--domain", arguments->domain, "DDS domain of the run, which `kilotwin run` prints")
+  app.add_option("--domain", arguments->domain,
+                 "DDS domain of the run, which `kilotwin run` prints; local runs (--mode local) have none")
       ->check(CLI::Range(0u, dds::kLastDomain).description(""))
       ->capture_default_str()
       ->type_name("N");

@@ -19,7 +19,9 @@
 #include "clients/recorder/summary.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
+#include "core/model/robot_parameters.hpp"
 #include "core/os/files.hpp"
+#include "core/plan/plan.hpp"
 
 namespace kilotwin::cli {
 namespace {
@@ -29,7 +31,41 @@ struct ExportArguments {
   std::filesystem::path variables, events, commands, observables, environment, pogosim;
   double every_s = 1;
   bool measured = false;
+  std::vector<std::string> kinds;  ///< of events; empty: all
 };
+
+std::vector<proto::RecordedEvent> event_kinds(const std::vector<std::string>& names) {
+  std::vector<proto::RecordedEvent> kinds;
+  for (const std::string& name : names) {
+    const auto kind = recorder::event_kind(name);
+    if (!kind)
+      throw UserError(fmt::format("--kind {}: is no kind of events; there are {}", name, recorder::kEventKinds));
+    kinds.push_back(*kind);
+  }
+  return kinds;
+}
+
+/// Each robot's calibrated duties; empty if the directory has no manifest.
+std::vector<recorder::CalibratedDuties> calibrated_duties(const recorder::RunDirectory& run) {
+  if (!std::filesystem::exists(run.manifest())) return {};
+  const RobotParameters parameters{RunPlan(read_manifest(run))};
+  std::vector<recorder::CalibratedDuties> duties;
+  for (std::uint32_t robot = 0; robot < parameters.robots(); ++robot) {
+    const Calibration& own = parameters.calibration(robot);
+    duties.push_back({own.turn_left, own.turn_right, own.straight_left, own.straight_right});
+  }
+  return duties;
+}
+
+/// The note on motions that no command of the table stands for; empty: there are none.
+std::string other_duties_note(const recorder::OtherDuties& other) {
+  if (other.changes == 0) return {};
+  return fmt::format(
+      "kilotwin: --commands: {} changes of motion, of {} robots, are to other duties than the calibrated ones; the "
+      "table names them by the motors that run. The first: robot {} at {:.6g} s, duties {} and {}. "
+      "--events FILE --kind motion has all duties",
+      other.changes, other.robots, other.robot, other.time_s, other.left, other.right);
+}
 
 /// What scripts need to know of a table's run.
 recorder::TableMetadata metadata_of(const recorder::RunDirectory& directory) {
@@ -62,9 +98,9 @@ int export_run(const ExportArguments& arguments) {
         "export: nothing to export; give --trajectories FILE, --variables FILE, --events FILE, --commands FILE, "
         "--observables FILE, --environment FILE, --bodies FILE, --messages FILE, --radio FILE, --cells FILE, "
         "--pogosim FILE, --mcap FILE, --model FILE, --report FILE or several; a table ends in .csv, .csv.gz, .npz "
-        "or "
-        ".arrow");
+        "or .arrow");
   }
+  const std::vector<proto::RecordedEvent> kinds = event_kinds(arguments.kinds);
   if (arguments.report == "-") throw UserError("--report -: needs a file; give --report FILE.html");
   const bool to_output = std::any_of(tables.begin(), tables.end(), [](const auto* table) { return *table == "-"; });
   const auto note = [&](const std::string& line) { to_output ? say(line) : fmt::print("{}\n", line); };
@@ -111,9 +147,13 @@ int export_run(const ExportArguments& arguments) {
   each(arguments.variables,
        [&](Reader& reader, const auto& file) { return recorder::export_variables(reader, file, about); });
   each(arguments.events,
-       [&](Reader& reader, const auto& file) { return recorder::export_events(reader, file, about); });
-  each(arguments.commands,
-       [&](Reader& reader, const auto& file) { return recorder::export_commands(reader, file, about); });
+       [&](Reader& reader, const auto& file) { return recorder::export_events(reader, file, kinds, about); });
+  each(arguments.commands, [&](Reader& reader, const auto& file) {
+    const recorder::ExportedCommands commands =
+        recorder::export_commands(reader, file, calibrated_duties(directory), about);
+    if (const std::string text = other_duties_note(commands.other); !text.empty()) say(text);
+    return commands.rows;
+  });
   each(arguments.observables,
        [&](Reader& reader, const auto& file) { return recorder::export_observables(reader, file, about); });
   each(arguments.environment, [&](Reader& reader, const auto& file) {
@@ -136,15 +176,26 @@ Command add_export(CLI::App& program) {
                                           "write tables from a recorded run: FILE.csv, FILE.csv.gz, FILE.npz for "
                                           "NumPy, FILE.arrow, or - for standard output");
   app.add_option("RUN", arguments->run, "run directory or recording")->required()->type_name("");
-  app.add_option("--trajectories", arguments->trajectories, fmt::format("columns {}", recorder::kTrajectoryColumns))
+  app.add_option("--trajectories", arguments->trajectories,
+                 fmt::format("columns {}, and battery_V if it was recorded", recorder::kTrajectoryColumns))
       ->type_name("FILE");
   app.add_option("--variables", arguments->variables,
                  "recorded variables of programs: columns time_s,robot,group and one per variable")
       ->type_name("FILE");
-  app.add_option("--events", arguments->events,
-                 "recorded events: columns time_s,event,robot,group,led_r,led_g,led_b,motor_left,motor_right,state,"
-                 "sender,distance_mm,text")
-      ->type_name("FILE");
+  CLI::Option* const events =
+      app.add_option(
+             "--events", arguments->events,
+             "recorded events: columns time_s,event,robot,group,led_r,led_g,led_b,motor_left,motor_right,state,"
+             "sender,distance_mm,text")
+          ->type_name("FILE");
+  app.add_option(
+         "--kind", arguments->kinds,
+         fmt::format("with --events: events of this kind alone, with the columns that they have; several are "
+                     "possible: {}",
+                     recorder::kEventKinds))
+      ->needs(events)
+      ->allow_extra_args(false)
+      ->type_name("KIND");
   app.add_option("--commands", arguments->commands,
                  "changes of motion, as `kilotwin identify` reads them: columns run,robot,time_s,motion")
       ->type_name("FILE");
@@ -165,7 +216,8 @@ Command add_export(CLI::App& program) {
                  "positions as a floor of 50 mm cells measures them: columns time_s,robot,x_mm,y_mm")
       ->type_name("FILE");
   app.add_option("--pogosim", arguments->pogosim,
-                 fmt::format("for programs that read pogosim's tables: columns {}", recorder::kPogosimColumns))
+                 fmt::format("for programs that read pogosim's tables: columns {}, and recorded variables",
+                             recorder::kPogosimColumns))
       ->type_name("FILE");
   app.add_option("--mcap", arguments->mcap, "for Foxglove, Lichtblick and Rerun: robots, bodies, counters, log")
       ->type_name("FILE");

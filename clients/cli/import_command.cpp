@@ -9,6 +9,7 @@
 
 #include "clients/cli/commands.hpp"
 #include "clients/importers/imported.hpp"
+#include "clients/importers/pogosim_table.hpp"
 #include "clients/importers/tracker_log.hpp"
 #include "core/base/error.hpp"
 #include "core/os/files.hpp"
@@ -47,6 +48,8 @@ Files files_of(const Imported& imported, const ImportArguments& arguments, const
   return files;
 }
 
+bool is_table(const std::string& ending) { return ending == ".csv" || ending == ".feather" || ending == ".arrow"; }
+
 bool is_log(const std::string& ending) { return ending == ".tsv" || ending == ".txt" || ending == ".log"; }
 
 void import_log(const ImportArguments& arguments, const fs::path& out) {
@@ -78,10 +81,36 @@ std::string behaviour_beside(const fs::path& behaviour, const fs::path& out) {
   return fs::proximate(fs::absolute(behaviour), fs::absolute(out).parent_path()).string();
 }
 
-void import_experiment(const ImportArguments& arguments, const fs::path& out, const std::string& ending) {
-  const bool yaml = ending == ".yaml" || ending == ".yml";
+void set_behaviours(const ImportArguments& arguments, const fs::path& out, proto::Experiment& experiment) {
+  if (arguments.behaviour.empty()) return;
+  for (proto::RobotGroup& group : *experiment.mutable_robots())
+    group.set_behaviour(0, behaviour_beside(arguments.behaviour, out));
+}
+
+void refuse_options_of_logs(const ImportArguments& arguments) {
   if (!arguments.format.empty() || arguments.unit_mm)
     throw UserError("--format and --unit-mm: are for logs of trackers");
+}
+
+void import_table(const ImportArguments& arguments, const fs::path& out) {
+  refuse_options_of_logs(arguments);
+  importers::ImportedTable table = importers::from_pogosim_table(arguments.file);
+  set_behaviours(arguments, out, table.imported.experiment);
+  const fs::path tracks = out.parent_path() / (out.stem().string() + "-tracks");
+  Files files = files_of(table.imported, arguments, out);
+  files.emplace_back(tracks / "trajectories.csv", table.tracks);
+  write_all(files, arguments.force);
+  for (const std::string& note : table.imported.notes) fmt::print("{}: {}\n", arguments.file.string(), note);
+  fmt::print(
+      "{0}: written, with {1} table{2} of poses. Next: kilotwin check {0}\n{3}: written. Next: kilotwin identify "
+      "--train {4}\n",
+      out.string(), table.imported.poses.size(), table.imported.poses.size() == 1 ? "" : "s",
+      files.back().first.string(), tracks.string());
+}
+
+void import_experiment(const ImportArguments& arguments, const fs::path& out, const std::string& ending) {
+  const bool yaml = ending == ".yaml" || ending == ".yml";
+  refuse_options_of_logs(arguments);
   const std::string text = os::read_file(arguments.file), name = arguments.file.string();
   // pogosim takes paths from the folder where it runs, which need not be that of the configuration.
   const auto read_beside = [&](const std::string& file) {
@@ -91,10 +120,7 @@ void import_experiment(const ImportArguments& arguments, const fs::path& out, co
   Imported imported = ending == ".json" ? importers::from_kilombo(text, name)
                       : yaml            ? importers::from_pogosim(text, name, read_beside)
                                         : importers::from_argos(text, name);
-  if (!arguments.behaviour.empty()) {
-    for (proto::RobotGroup& group : *imported.experiment.mutable_robots())
-      group.set_behaviour(0, behaviour_beside(arguments.behaviour, out));
-  }
+  set_behaviours(arguments, out, imported.experiment);
   write_all(files_of(imported, arguments, out), arguments.force);
   for (const std::string& note : imported.notes) fmt::print("{}:{}{}\n", name, ending == ".json" ? " " : "", note);
   fmt::print("{}: written{}. Next: kilotwin check {}\n", out.string(),
@@ -108,15 +134,17 @@ int import_file(const ImportArguments& arguments) {
   const std::string ending = arguments.file.extension().string();
   const bool known =
       ending == ".argos" || ending == ".xml" || ending == ".json" || ending == ".yaml" || ending == ".yml";
-  if (!known && !is_log(ending))
-    throw UserError(
-        fmt::format("{}: is of no known kind; give an .argos file, a .json file of Kilombo, a .yaml file of "
-                    "pogosim, or a log of ARK or LARS that ends in .tsv, .txt or .log",
-                    arguments.file.string()));
+  if (!known && !is_log(ending) && !is_table(ending))
+    throw UserError(fmt::format(
+        "{}: is of no known kind; give an .argos file, a .json file of Kilombo, a .yaml file or a table "
+        "(.feather, .csv) of pogosim, or a log of ARK or LARS that ends in .tsv, .txt or .log",
+        arguments.file.string()));
   fs::path out = arguments.out;
   if (out.empty()) out = fs::path(arguments.file).replace_extension(".txtpb").filename();
   if (is_log(ending))
     import_log(arguments, out);
+  else if (is_table(ending))
+    import_table(arguments, out);
   else
     import_experiment(arguments, out, ending);
   return kDone;
@@ -126,12 +154,14 @@ int import_file(const ImportArguments& arguments) {
 
 Command add_import(CLI::App& program) {
   const auto arguments = std::make_shared<ImportArguments>();
-  CLI::App& app = *program.add_subcommand(
-      "import",
-      "make an experiment file of an .argos file, of Kilombo's JSON, of pogosim's YAML, or of a tracker's log");
-  app.add_option("FILE", arguments->file,
-                 "an .argos file, a .json file of Kilombo, a .yaml file of pogosim, or a log (.tsv, .txt, .log) of "
-                 "ARK or LARS")
+  CLI::App& app = *program.add_subcommand("import",
+                                          "make an experiment file of an .argos file, of Kilombo's JSON, of "
+                                          "pogosim's YAML or its tables, or of a tracker's "
+                                          "log");
+  app.add_option(
+         "FILE", arguments->file,
+         "an .argos file, a .json file of Kilombo, a .yaml file or a table (.feather, .csv) of pogosim, or a log "
+         "(.tsv, .txt, .log) of ARK or LARS")
       ->required()
       ->check(CLI::ExistingFile.description(""));
   app.add_option("-o,--out", arguments->out, "the experiment file (default: FILE's name with .txtpb, here)")

@@ -40,6 +40,13 @@ void add_experiment_options(CLI::App& app, RunArguments& arguments) {
       ->type_name("FILE");
 }
 
+void add_strict_option(CLI::App& app, RunArguments& arguments) {
+  app.add_flag(
+      "--strict", arguments.strict,
+      "a run in which a robot's program fails counts as failed: it is listed, not in the means, and the status "
+      "is 1");
+}
+
 void add_change_options(CLI::App& app, RunArguments& arguments) {
   app.add_option("--seed", arguments.seed, "seed of all random numbers")
       ->transform(CLI::Validator(decimal_seed, ""))

@@ -40,12 +40,14 @@ struct RunArguments {
   double give_up_after_s = 0;  ///< longest wait of services for each other without progress; 0: no limit
   MonitorOptions monitor;
   Output output;
-  bool strict = false;  ///< end with status 1 where a program has failed
+  bool strict = false;  ///< a run in which a program has failed ends with status 1
   bool quiet = false;   ///< print neither progress nor summary
 };
 
 /// Adds the argument EXPERIMENT and the options that replace parts of the experiment, for `run`, `check` and `sweep`.
 void add_experiment_options(CLI::App& app, RunArguments& arguments);
+/// Adds --strict, for `sweep` and `tune`.
+void add_strict_option(CLI::App& app, RunArguments& arguments);
 /// Adds --seed and --set, for `run` and `debug`.
 void add_change_options(CLI::App& app, RunArguments& arguments);
 

@@ -43,7 +43,7 @@ struct SweepArguments {
   std::uint32_t jobs = 0;  ///< runs at a time; 0: one per core
   fs::path resume;         ///< a sweep to go on with
   bool slurm = false;
-  std::vector<std::string> slurm_options;  ///< for sbatch
+  SlurmOptions slurm_options;
 };
 
 /// Failed runs that are reported one by one; the others are counted.
@@ -108,6 +108,7 @@ void add_runs(const SweepArguments& arguments, Sweep& sweep) {
       run.seed = seed;
       run.directory = sweep.directory / fmt::format("{:04}-{}", point, seed);
       run.words = words_of(arguments, sweep.points[point], run);
+      run.strict = arguments.run.strict;
     }
   }
 }
@@ -221,6 +222,11 @@ int sweep(const SweepArguments& arguments) {
     say(fmt::format("kilotwin: {}{} lists the runs that failed, and why",
                     report.runs() == 0 ? "no run came to its end; " : "", (sweep.directory / "runs.csv").string()));
   if (report.runs() == 0) return kFailed;
+  if (const std::size_t runs = report.runs_with_failed_robots(); runs > 0)
+    say(fmt::format(
+        "kilotwin: robots failed in {} of {} runs; the column robots_failed of {} says in which; --strict "
+        "leaves such runs out of the means",
+        runs, report.runs(), (sweep.directory / "runs.csv").string()));
   print_results(arguments, sweep, report, plotted);
   return results.failed() == 0 && all ? kDone : kFailed;
 }
@@ -276,12 +282,19 @@ Command add_sweep(CLI::App& program) {
   app.add_option("--latin-seed", arguments->latin_seed, "seed of the points of --latin")
       ->capture_default_str()
       ->type_name("N");
+  add_strict_option(app, arguments->run);
   app.add_option("--resume", arguments->resume,
                  "go on with the sweep in this directory: runs that are done stay; --seeds may be more")
       ->type_name("DIR");
   CLI::Option* const slurm = app.add_flag("--slurm", arguments->slurm,
                                           "run as one array job of Slurm, wait for it, and merge its results");
-  app.add_option("--slurm-option", arguments->slurm_options, "an option for sbatch, such as --time=1:00:00")
+  app.add_option("--slurm-program", arguments->slurm_options.program,
+                 "with --slurm: what starts the program on the nodes, for a shell (default: its path here); for an "
+                 "image: apptainer run /shared/kilotwin.sif")
+      ->needs(slurm)
+      ->type_name("COMMAND");
+  app.add_option("--slurm-option", arguments->slurm_options.for_sbatch,
+                 "an option for sbatch, such as --time=1:00:00")
       ->needs(slurm)
       ->allow_extra_args(false)
       ->type_name("OPTION");

@@ -140,6 +140,11 @@ void SweepReport::add_failed(std::size_t point, std::uint64_t seed, const std::f
   entry.failure = why;
 }
 
+std::size_t SweepReport::runs_with_failed_robots() const {
+  return static_cast<std::size_t>(
+      std::count_if(all_runs_.begin(), all_runs_.end(), [](const Run& run) { return run.robots_failed > 0; }));
+}
+
 std::size_t SweepReport::plotted() const {
   const auto own = std::find(own_.begin(), own_.end(), plots_.own);
   if (own == own_.end()) return static_cast<std::size_t>(plots_.observable);

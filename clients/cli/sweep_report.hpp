@@ -44,6 +44,8 @@ class SweepReport {
   void add_failed(std::size_t point, std::uint64_t seed, const std::filesystem::path& run, const std::string& why);
   /// Number of runs added.
   [[nodiscard]] std::size_t runs() const { return runs_; }
+  /// Number of those in which robots failed.
+  [[nodiscard]] std::size_t runs_with_failed_robots() const;
 
   /// The table for the terminal: one line per point; with several models one more per design.
   [[nodiscard]] std::string table() const;

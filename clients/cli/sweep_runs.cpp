@@ -63,6 +63,7 @@ std::vector<std::string> run_words(const RunArguments& arguments, const SweepPoi
   if (arguments.robots) words.insert(words.end(), {"--robots", std::to_string(*arguments.robots)});
   if (!arguments.behaviour.empty()) words.insert(words.end(), {"--behaviour", arguments.behaviour.string()});
   if (!arguments.model.empty()) words.insert(words.end(), {"--model", arguments.model.string()});
+  if (arguments.strict) words.emplace_back("--strict");
   return words;
 }
 

@@ -19,6 +19,7 @@ struct SweepRun {
   std::uint64_t seed = 0;
   std::filesystem::path directory;  ///< run directory; stdout and stderr go to directory + ".log"
   std::vector<std::string> words;   ///< command line
+  bool strict = false;              ///< a run in which robots failed counts as failed
   bool well = false;                ///< the process ended with status 0
   std::string last_line;            ///< last line of its log: the error if it failed
 };

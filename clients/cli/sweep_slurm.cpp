@@ -39,11 +39,11 @@ fs::path required_tool(const char* name) {
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
 
 /// A line per run. Its log and exit status stand beside its directory.
-std::string commands_of(const std::vector<SweepRun>& runs) {
-  const fs::path program = fs::read_symlink("/proc/self/exe");
+std::string commands_of(const std::vector<SweepRun>& runs, const std::string& program) {
+  const std::string start = program.empty() ? shell_word(fs::read_symlink("/proc/self/exe").string()) : program;
   std::string text;
   for (const SweepRun& run : runs) {
-    std::string line = shell_word(program.string());
+    std::string line = start;
     for (std::size_t i = 1; i < run.words.size(); ++i) line += " " + shell_word(run.words[i]);
     const std::string directory = run.directory.string();
     text += fmt::format("{} > {} 2>&1\n", line, shell_word(directory + ".log"));
@@ -111,16 +111,15 @@ class JobWatch {
 };
 
 /// Submits the array of runs and returns the job's id. Throws RunError.
-std::string submit(const std::vector<SweepRun>& runs, const fs::path& directory,
-                   const std::vector<std::string>& options) {
+std::string submit(const std::vector<SweepRun>& runs, const fs::path& directory, const SlurmOptions& options) {
   const fs::path sbatch = required_tool("sbatch");
   const std::size_t runs_each = (runs.size() + kMostElements - 1) / kMostElements;
   const std::size_t elements = (runs.size() + runs_each - 1) / runs_each;
-  os::write_file(directory / "commands", commands_of(runs));
+  os::write_file(directory / "commands", commands_of(runs, options.program));
   const fs::path script = directory / "array.sbatch";
   os::write_file(script, script_of(directory, elements, runs.size(), runs_each));
   std::vector<std::string> words{sbatch.string(), "--parsable", "--chdir=" + fs::current_path().string()};
-  words.insert(words.end(), options.begin(), options.end());
+  words.insert(words.end(), options.for_sbatch.begin(), options.for_sbatch.end());
   words.push_back(script.string());
   const os::ProcessResult submitted = os::run_process(words);
   if (!submitted.end.well()) throw RunError("--slurm: sbatch refused the job: " + first_line(submitted.errors));
@@ -153,7 +152,7 @@ void require_no_job(const fs::path& directory) {
   fs::remove(job_file(directory));
 }
 
-bool run_on_slurm(std::vector<SweepRun>& runs, const fs::path& directory, const std::vector<std::string>& options,
+bool run_on_slurm(std::vector<SweepRun>& runs, const fs::path& directory, const SlurmOptions& options,
                   const std::function<void(const SweepRun&)>& ended) {
   if (runs.empty()) return true;
   const fs::path squeue = required_tool("squeue"), scancel = required_tool("scancel");

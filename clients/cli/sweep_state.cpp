@@ -6,6 +6,7 @@
 
 #include "clients/cli/prepare.hpp"
 #include "clients/recorder/reader.hpp"
+#include "clients/recorder/summary.hpp"
 #include "core/base/build_identity.hpp"
 #include "core/base/error.hpp"
 #include "core/os/files.hpp"
@@ -108,6 +109,7 @@ bool is_complete(const SweepRun& run) {
     while (const proto::Record* record = recording.next()) {
       if (record->has_end()) well = record->end().failure().empty();
     }
+    if (run.strict && recorder::read_summary(run.directory / "summary.json").robots_failed > 0) return false;
     return well && recording.ended() && recording.warning().empty();
   } catch (const std::exception&) {
     return false;

@@ -8,8 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "clients/recorder/latest_variables.hpp"
+#include "clients/recorder/ordered_records.hpp"
 #include "core/base/error.hpp"
 #include "core/base/ids.hpp"
+#include "core/observations/variable_sampler.hpp"
 
 namespace kilotwin::recorder {
 namespace {
@@ -34,7 +37,8 @@ void check_interval(const Reader& recording, const RecordingSchedule& wanted, do
 }
 
 void append_rows(Table& table, const proto::StateRecord& state, Tick tick, TickLength length, Poses which,
-                 const std::vector<std::uint32_t>& groups, const std::array<std::string, 256>& states) {
+                 const std::vector<std::uint32_t>& groups, const std::array<std::string, 256>& states,
+                 const LatestVariables& variables) {
   const bool measured = which == Poses::kMeasured && state.measured_x_mm_size() == state.x_mm_size();
   const auto robots = static_cast<std::size_t>(state.x_mm_size());
   for (std::size_t i = 0; i < robots; ++i) {
@@ -50,6 +54,7 @@ void append_rows(Table& table, const proto::StateRecord& state, Tick tick, TickL
     const auto life_cycle = static_cast<std::uint8_t>(state.life_cycle()[i]);
     table.text(states[life_cycle]);
     table.integer(life_cycle == static_cast<std::uint8_t>(LifeCycle::kFailed) ? 1 : 0);
+    variables.put(table, i);
     table.end_row();
   }
 }
@@ -65,25 +70,49 @@ void append_body_rows(Table& table, const proto::StateRecord& state, Tick tick, 
   }
 }
 
-/// Writes the rows of the scheduled states; `append` adds the rows of one state.
+/// Calls `take` with each recorded state, by time, after `variables` has taken all values until then.
+template <class Take> void each_state(Reader& recording, LatestVariables& variables, Take take) {
+  if (variables.empty()) {
+    while (const proto::StateRecord* state = recording.next_state()) take(*state);
+    return;
+  }
+  OrderedRecords ordered(recording, OrderedRecords::kStates | OrderedRecords::kVariables);
+  while (ordered.next()) {
+    variables.take(ordered.records().variables);
+    if (ordered.records().state) take(*ordered.records().state);
+  }
+}
+
+/// Writes the rows of the scheduled states; `append` adds the rows of one state. The columns of `variables` follow `columns`.
 template <class Append>
 std::uint64_t export_states(Reader& recording, const std::filesystem::path& file, double every_s,
-                            std::vector<Column> columns, const TableMetadata& metadata, Append append) {
+                            std::vector<Column> columns, LatestVariables variables, const TableMetadata& metadata,
+                            Append append) {
   if (!(every_s >= 1e-3 && every_s <= 1e9)) {
     throw UserError(fmt::format("--every {}: out of range; expected 0.001 to 1e9 seconds", every_s));
   }
   const RecordingSchedule wanted(recording.tick_length(), every_s);
   check_interval(recording, wanted, every_s);
+  for (Column& column : variables.columns()) columns.push_back(std::move(column));
   const auto table = open_table(file, std::move(columns), metadata);
   Tick next = wanted.at_or_after(Tick{recording.header().first_tick()});
-  while (const proto::StateRecord* state = recording.next_state()) {
-    const Tick tick{state->tick()};
-    if (tick < next) continue;
-    append(*table, *state, tick);
+  each_state(recording, variables, [&](const proto::StateRecord& state) {
+    const Tick tick{state.tick()};
+    if (tick < next) return;
+    append(*table, state, tick, variables);
     next = wanted.at_or_after(tick + 1);
-  }
+  });
   table->close();
   return table->rows();
+}
+
+/// The recorded variables that `wanted` accepts by their names.
+template <class Wanted> LatestVariables variables_of(const proto::RecordingHeader& header, Wanted wanted) {
+  std::vector<std::size_t> chosen;
+  for (int i = 0; i < header.variable_size(); ++i) {
+    if (wanted(header.variable(i).name())) chosen.push_back(static_cast<std::size_t>(i));
+  }
+  return {header, std::move(chosen)};
 }
 
 const Column kTime{"time_s", "s", CellType::kTime};
@@ -136,10 +165,12 @@ std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path
                                     {"group", "", CellType::kInteger},
                                     {"state", "", CellType::kText},
                                     {"failed", "", CellType::kInteger}};
-  return export_states(recording, file, every_s, columns, metadata,
-                       [&](Table& table, const proto::StateRecord& state, Tick tick) {
-                         append_rows(table, state, tick, recording.tick_length(), which, groups, states);
-                       });
+  const auto is_battery = [](const std::string& name) { return name == kBatteryVariable; };
+  return export_states(
+      recording, file, every_s, columns, variables_of(recording.header(), is_battery), metadata,
+      [&](Table& table, const proto::StateRecord& state, Tick tick, const LatestVariables& variables) {
+        append_rows(table, state, tick, recording.tick_length(), which, groups, states, variables);
+      });
 }
 
 std::uint64_t export_pogosim(Reader& recording, const std::filesystem::path& file, double every_s,
@@ -150,21 +181,30 @@ std::uint64_t export_pogosim(Reader& recording, const std::filesystem::path& fil
     return header.group_robots_size() < 2 ? std::string("robots") : fmt::format("robots-{}", group);
   };
   const double corner_x = header.arena_width_mm() / 2, corner_y = header.arena_height_mm() / 2;
-  const std::vector<Column> columns{{"time", "s", CellType::kTime},       {"robot_category", "", CellType::kText},
-                                    {"robot_id", "", CellType::kInteger}, {"x", "mm", CellType::kNumber, 4},
-                                    {"y", "mm", CellType::kNumber, 4},    {"angle", "rad", CellType::kNumber, 6}};
-  return export_states(recording, file, every_s, columns, metadata,
-                       [&](Table& table, const proto::StateRecord& state, Tick tick) {
-                         for (int i = 0; i < state.x_mm_size(); ++i) {
-                           table.time(tick, recording.tick_length());
-                           table.text(category(groups[static_cast<std::size_t>(i)]));
-                           table.integer(i);
-                           table.number(state.x_mm(i) + corner_x);
-                           table.number(state.y_mm(i) + corner_y);
-                           table.number(state.heading_rad(i));
-                           table.end_row();
-                         }
-                       });
+  const std::vector<Column> columns{
+      {"time", "s", CellType::kTime},           {"robot_category", "", CellType::kText},
+      {"robot_id", "", CellType::kInteger},     {"x", "mm", CellType::kNumber, 4},
+      {"y", "mm", CellType::kNumber, 4},        {"angle", "rad", CellType::kNumber, 6},
+      {"pogobot_ticks", "", CellType::kInteger}};
+  TableMetadata about = metadata;
+  about.emplace_back("arena_width_mm", fmt::format("{}", header.arena_width_mm()));
+  about.emplace_back("arena_height_mm", fmt::format("{}", header.arena_height_mm()));
+  return export_states(
+      recording, file, every_s, columns, variables_of(header, [](const std::string&) { return true; }), about,
+      [&](Table& table, const proto::StateRecord& state, Tick tick, const LatestVariables& variables) {
+        for (int i = 0; i < state.x_mm_size(); ++i) {
+          const auto robot = static_cast<std::size_t>(i);
+          table.time(tick, recording.tick_length());
+          table.text(category(groups[robot]));
+          table.integer(i);
+          table.number(state.x_mm(i) + corner_x);
+          table.number(state.y_mm(i) + corner_y);
+          table.number(state.heading_rad(i));
+          table.integer(tick.count());
+          variables.put(table, robot);
+          table.end_row();
+        }
+      });
 }
 
 std::uint64_t export_bodies(Reader& recording, const std::filesystem::path& file, double every_s,
@@ -173,7 +213,8 @@ std::uint64_t export_bodies(Reader& recording, const std::filesystem::path& file
     throw UserError(fmt::format("{}: no movable bodies; the experiment names none", recording.path().string()));
   }
   return export_states(recording, file, every_s, {kTime, {"body", "", CellType::kInteger}, kX, kY, kHeading},
-                       metadata, [&](Table& table, const proto::StateRecord& state, Tick tick) {
+                       LatestVariables(recording.header(), {}), metadata,
+                       [&](Table& table, const proto::StateRecord& state, Tick tick, const LatestVariables&) {
                          append_body_rows(table, state, tick, recording.tick_length());
                        });
 }

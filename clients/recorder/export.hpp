@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,7 +23,7 @@ inline constexpr std::string_view kTrajectoryColumns =
 /// The last column is 1 in rows whose count is the number of messages that the robot itself sent.
 inline constexpr std::string_view kMessageColumns = "receiver,sender,count,sent_if_receiver_is_sender";
 
-/// Columns kTrajectoryColumns: one row per robot at 0, every_s, 2 every_s..., sorted by time and then by robot. A row has the
+/// Columns kTrajectoryColumns, and battery_V if it was recorded: one row per robot at 0, every_s, 2 every_s..., sorted by time and then by robot. A row has the
 /// first recorded state at or after its time; time_s is the exact simulated time of that state's tick. Lengths have 4
 /// decimals, angles 6. Without recorded measured poses, `which` has no effect.
 /// Returns the number of rows. Throws UserError if the recording has no state within one tick after each of these times, i.e.
@@ -31,8 +32,10 @@ std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path
                                   Poses which = Poses::kTrue, const TableMetadata& metadata = {});
 
 /// The columns of pogosim's own tables: time (s), robot_category ("robots", or "robots-GROUP" of several groups), robot_id, x, y (mm),
-/// angle (rad). Their origin is the corner of the arena's bounding box. Rows as of export_trajectories().
-inline constexpr std::string_view kPogosimColumns = "time,robot_category,robot_id,x,y,angle";
+/// angle (rad), pogobot_ticks (ticks of 32.768 ms since the start). Then come the recorded variables, under their names, with their
+/// newest values. The origin is the corner of the arena's bounding box, whose size is in the metadata. Rows as of
+/// export_trajectories().
+inline constexpr std::string_view kPogosimColumns = "time,robot_category,robot_id,x,y,angle,pogobot_ticks";
 std::uint64_t export_pogosim(Reader& recording, const std::filesystem::path& file, double every_s = 1,
                              const TableMetadata& metadata = {});
 
@@ -57,15 +60,42 @@ std::uint64_t export_radio(Reader& recording, const std::filesystem::path& file,
 std::uint64_t export_variables(Reader& recording, const std::filesystem::path& file,
                                const TableMetadata& metadata = {});
 
+/// Kinds of events as tables name them.
+inline constexpr std::string_view kEventKinds = "led, motion, state, sent, received, station, failure";
+/// Nothing: there is no such kind.
+[[nodiscard]] std::optional<proto::RecordedEvent> event_kind(std::string_view name);
+
 /// Columns time_s,event,robot,group,led_r,led_g,led_b,motor_left,motor_right,state,sender,distance_mm,text: one row per event, by
 /// ascending time. Cells that say nothing about the event are empty. Times of messages are exact to the cycle, others to the tick.
+/// `kinds`: events of these kinds alone, and of the columns those that say something about one of them; empty: all. Throws UserError
+/// if the run did not record one of `kinds`.
 std::uint64_t export_events(Reader& recording, const std::filesystem::path& file,
+                            const std::vector<proto::RecordedEvent>& kinds = {},
                             const TableMetadata& metadata = {});
 
-/// Columns run,robot,time_s,motion, as `kilotwin identify` reads commands: every change of a robot's motion, exact to the tick. Throws
-/// UserError if the run did not record the event MOTION.
-std::uint64_t export_commands(Reader& recording, const std::filesystem::path& file,
-                              const TableMetadata& metadata = {});
+/// Duties at which a robot turns or goes straight by its calibration: kilo_turn_left and so on.
+struct CalibratedDuties {
+  std::uint8_t turn_left = 0, turn_right = 0, straight_left = 0, straight_right = 0;
+};
+/// Changes of motion to other duties than the robot's calibrated ones.
+struct OtherDuties {
+  std::uint64_t changes = 0;
+  std::uint32_t robots = 0;  ///< robots with such changes
+  // The first one.
+  std::uint32_t robot = 0, left = 0, right = 0;
+  double time_s = 0;
+};
+struct ExportedCommands {
+  std::uint64_t rows = 0;
+  OtherDuties other;  ///< nothing where `calibrated` is empty
+};
+
+/// Columns run,robot,time_s,motion, as `kilotwin identify` reads commands: every change of a robot's motion, exact to the tick. A motion
+/// is named by the motors that run, whatever their duties. `calibrated`: per robot; empty: unknown. Throws UserError if the run did not
+/// record the event MOTION.
+ExportedCommands export_commands(Reader& recording, const std::filesystem::path& file,
+                                 const std::vector<CalibratedDuties>& calibrated = {},
+                                 const TableMetadata& metadata = {});
 
 /// Columns time_s, one per observable of the experiment, and those of observables.hpp: one row per recorded state.
 std::uint64_t export_observables(Reader& recording, const std::filesystem::path& file,

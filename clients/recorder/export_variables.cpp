@@ -4,9 +4,9 @@
 #include <utility>
 
 #include "clients/recorder/export.hpp"
+#include "clients/recorder/latest_variables.hpp"
 #include "clients/recorder/ordered_records.hpp"
 #include "core/base/error.hpp"
-#include "core/observations/variable_sampler.hpp"
 
 namespace kilotwin::recorder {
 namespace {
@@ -62,9 +62,7 @@ std::uint64_t export_variables(Reader& recording, const std::filesystem::path& f
   }
   std::vector<Column> columns{
       {"time_s", "s", CellType::kTime}, {"robot", "", CellType::kInteger}, {"group", "", CellType::kInteger}};
-  for (const proto::VariableColumn& variable : header.variable())
-    columns.push_back({variable.name(), variable.name() == kBatteryVariable ? "V" : "",
-                       variable.integer() ? CellType::kInteger : CellType::kNumber});
+  for (const proto::VariableColumn& variable : header.variable()) columns.push_back(column_of(variable));
   const auto table = open_table(file, std::move(columns), metadata);
   const std::vector<std::uint32_t> groups = groups_of(header);
   const auto variables = static_cast<std::size_t>(header.variable_size());

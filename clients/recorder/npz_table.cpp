@@ -103,20 +103,73 @@ std::string fitting_json(const std::vector<Column>& columns, TableMetadata metad
   return json;
 }
 
+/// Cells of a block. A column's last block may have fewer.
+constexpr std::size_t kBlock = 8192;
+
+/// A block: the octets per cell, the least number, and each cell's number above it in so many octets, little-endian.
+constexpr std::size_t kBlockHead = 1 + sizeof(std::int64_t);
+
+template <class Octet>
+void append_narrow(std::string& to, const std::vector<std::uint64_t>& cells, std::uint64_t least) {
+  const std::size_t begin = to.size();
+  to.resize(begin + cells.size() * sizeof(Octet));
+  char* at = to.data() + begin;
+  for (const std::uint64_t cell : cells) {
+    const auto narrow = static_cast<Octet>(cell - least);
+    std::memcpy(at, &narrow, sizeof narrow);
+    at += sizeof narrow;
+  }
+}
+
+template <class Octet> void read_narrow(const char* at, std::vector<std::uint64_t>& cells, std::uint64_t least) {
+  for (std::uint64_t& cell : cells) {
+    Octet narrow = 0;
+    std::memcpy(&narrow, at, sizeof narrow);
+    cell = least + narrow;
+    at += sizeof narrow;
+  }
+}
+
+void append_block(std::string& to, const std::vector<std::uint64_t>& cells, bool whole_numbers) {
+  std::uint64_t least = 0, range = std::numeric_limits<std::uint64_t>::max();
+  if (whole_numbers) {
+    const auto less = [](std::uint64_t a, std::uint64_t b) {
+      return std::bit_cast<std::int64_t>(a) < std::bit_cast<std::int64_t>(b);
+    };
+    const auto [low, high] = std::minmax_element(cells.begin(), cells.end(), less);
+    least = *low;
+    range = *high - least;
+  }
+  const std::uint8_t width = range == 0 ? 0 : range <= 0xff ? 1 : range <= 0xffff ? 2 : range <= 0xffffffff ? 4 : 8;
+  to += static_cast<char>(width);
+  to.append(reinterpret_cast<const char*>(&least), sizeof least);
+  if (width == 1) append_narrow<std::uint8_t>(to, cells, least);
+  if (width == 2) append_narrow<std::uint16_t>(to, cells, least);
+  if (width == 4) append_narrow<std::uint32_t>(to, cells, least);
+  if (width == 8) append_narrow<std::uint64_t>(to, cells, least);
+}
+
+/// Sets `cells`, whose number is known, from a block's octets after its head.
+void read_block(std::uint8_t width, std::uint64_t least, const char* octets, std::vector<std::uint64_t>& cells) {
+  if (width == 0) std::fill(cells.begin(), cells.end(), least);
+  if (width == 1) read_narrow<std::uint8_t>(octets, cells, least);
+  if (width == 2) read_narrow<std::uint16_t>(octets, cells, least);
+  if (width == 4) read_narrow<std::uint32_t>(octets, cells, least);
+  if (width == 8) read_narrow<std::uint64_t>(octets, cells, least);
+}
+
 }  // namespace
 
-NpzTable::NpzTable(std::filesystem::path file, std::vector<Column> columns, const TableMetadata& metadata)
+NpzTable::NpzTable(std::filesystem::path file, std::vector<Column> columns, const TableMetadata& metadata,
+                   std::size_t most_waiting)
     : Table(columns.size()),
       file_(std::move(file)),
       described_(std::move(columns)),
-      comment_(fitting_json(described_, metadata)) {
+      comment_(fitting_json(described_, metadata)),
+      most_waiting_(most_waiting) {
   output_.reset(std::fopen(file_.c_str(), "wb"));
   if (!output_) fail();
-  for (std::size_t i = 0; i < columns_; ++i) {
-    Spill& spill = spills_.emplace_back();
-    spill.cells.reset(std::tmpfile());
-    if (!spill.cells) throw RunError(fmt::format("a temporary file cannot be made: {}", os::system_reason()));
-  }
+  waiting_.resize(columns_);
 }
 
 void NpzTable::fail() const {
@@ -124,8 +177,33 @@ void NpzTable::fail() const {
 }
 
 void NpzTable::put(std::uint64_t bits) {
-  if (std::fwrite(&bits, sizeof bits, 1, spills_[cell_++].cells.get()) != 1)
-    throw RunError(fmt::format("a temporary file cannot be written: {}", os::system_reason()));
+  std::vector<std::uint64_t>& cells = waiting_[cell_].cells;
+  cells.push_back(bits);
+  if (cells.size() == kBlock) pack(cell_);
+  ++cell_;
+}
+
+void NpzTable::pack(std::size_t column) {
+  Waiting& waiting = waiting_[column];
+  if (waiting.cells.empty()) return;
+  const CellType type = described_[column].type;
+  const std::size_t before = waiting.blocks.size();
+  append_block(waiting.blocks, waiting.cells, type == CellType::kInteger || type == CellType::kText);
+  packed_ += waiting.blocks.size() - before;
+  waiting.cells.clear();
+  if (packed_ > most_waiting_) spill();
+}
+
+void NpzTable::spill() {
+  for (Waiting& waiting : waiting_) {
+    if (!waiting.spilled) waiting.spilled.reset(std::tmpfile());
+    if (!waiting.spilled) throw RunError(fmt::format("a temporary file cannot be made: {}", os::system_reason()));
+    const std::string& blocks = waiting.blocks;
+    if (std::fwrite(blocks.data(), 1, blocks.size(), waiting.spilled.get()) != blocks.size())
+      throw RunError(fmt::format("a temporary file cannot be written: {}", os::system_reason()));
+    waiting.blocks.clear();
+  }
+  packed_ = 0;
 }
 
 void NpzTable::integer(std::int64_t value) { put(std::bit_cast<std::uint64_t>(value)); }
@@ -133,18 +211,18 @@ void NpzTable::integer(std::int64_t value) { put(std::bit_cast<std::uint64_t>(va
 void NpzTable::number(double value) { put(std::bit_cast<std::uint64_t>(value)); }
 
 void NpzTable::text(std::string_view value) {
-  Spill& spill = spills_[cell_];
-  auto found = spill.texts.find(value);
-  if (found == spill.texts.end()) {
-    found = spill.texts.emplace(value, static_cast<std::int64_t>(spill.by_number.size())).first;
-    spill.by_number.emplace_back(value);
-    spill.longest = std::max(spill.longest, code_points(value).size());
+  Waiting& waiting = waiting_[cell_];
+  auto found = waiting.texts.find(value);
+  if (found == waiting.texts.end()) {
+    found = waiting.texts.emplace(value, static_cast<std::int64_t>(waiting.by_number.size())).first;
+    waiting.by_number.emplace_back(value);
+    waiting.longest = std::max(waiting.longest, code_points(value).size());
   }
   integer(found->second);
 }
 
 void NpzTable::missing() {
-  spills_[cell_].any_missing = true;
+  waiting_[cell_].any_missing = true;
   switch (described_[cell_].type) {
     case CellType::kInteger: return integer(kMissingInteger);
     case CellType::kText: return integer(kMissingText);
@@ -164,40 +242,54 @@ void NpzTable::append(const void* octets, std::size_t size) {
   crc_ = static_cast<std::uint32_t>(::crc32_z(crc_, static_cast<const Bytef*>(octets), size));
 }
 
-/// The cells of a column after its array's header.
-void NpzTable::copy(Spill& spill, const Column& column) {
+void NpzTable::copy(Waiting& waiting, const Column& column) {
   const bool is_text = column.type == CellType::kText;
-  const bool as_double = column.type == CellType::kInteger && spill.any_missing;
-  const std::string type = is_text                                           ? fmt::format("<U{}", spill.longest)
+  const bool as_double = column.type == CellType::kInteger && waiting.any_missing;
+  const std::string type = is_text                                           ? fmt::format("<U{}", waiting.longest)
                            : column.type == CellType::kInteger && !as_double ? "<i8"
                                                                              : "<f8";
   const std::string header = array_header(type, rows_);
   append(header.data(), header.size());
-  std::vector<std::u32string> texts;
-  for (const std::string& text : spill.by_number) {
+  std::vector<std::u32string> texts{std::u32string(waiting.longest, U'\0')};  // the first: none
+  for (const std::string& text : waiting.by_number) {
     texts.push_back(code_points(text));
-    texts.back().resize(spill.longest, U'\0');
+    texts.back().resize(waiting.longest, U'\0');
   }
-  const std::u32string none(spill.longest, U'\0');
-  std::rewind(spill.cells.get());
-  constexpr std::size_t kBlock = 8192;
-  std::vector<std::uint64_t> block(kBlock);
-  for (std::uint64_t left = rows_; left > 0;) {
-    const std::size_t count = std::fread(
-        block.data(), 8, static_cast<std::size_t>(std::min<std::uint64_t>(left, kBlock)), spill.cells.get());
-    if (count == 0) throw RunError(fmt::format("a temporary file cannot be read: {}", os::system_reason()));
-    left -= count;
-    for (std::size_t i = 0; i < count && (is_text || as_double); ++i) {
-      const auto value = std::bit_cast<std::int64_t>(block[i]);
-      if (is_text) {
-        const std::u32string& text = value == kMissingText ? none : texts[static_cast<std::size_t>(value)];
-        append(text.data(), text.size() * sizeof(char32_t));
-      } else {
-        block[i] = std::bit_cast<std::uint64_t>(value == kMissingInteger ? std::numeric_limits<double>::quiet_NaN()
-                                                                         : static_cast<double>(value));
-      }
+  if (waiting.spilled) std::rewind(waiting.spilled.get());
+  std::string_view in_memory = waiting.blocks;
+  std::string octets;
+  const auto next = [&](std::size_t count) {
+    octets.resize(count);
+    if (waiting.spilled && std::fread(octets.data(), 1, count, waiting.spilled.get()) == count) return;
+    if (waiting.spilled && std::ferror(waiting.spilled.get()) != 0)
+      throw RunError(fmt::format("a temporary file cannot be read: {}", os::system_reason()));
+    waiting.spilled.reset();
+    KILOTWIN_DEMAND(in_memory.size() >= count);
+    in_memory.copy(octets.data(), count);
+    in_memory.remove_prefix(count);
+  };
+  std::vector<std::uint64_t> cells;
+  std::u32string text;
+  for (std::uint64_t left = rows_; left > 0; left -= cells.size()) {
+    cells.resize(static_cast<std::size_t>(std::min<std::uint64_t>(left, kBlock)));
+    next(kBlockHead);
+    const auto width = static_cast<std::uint8_t>(octets[0]);
+    std::uint64_t least = 0;
+    std::memcpy(&least, octets.data() + 1, sizeof least);
+    next(width * cells.size());
+    read_block(width, least, octets.data(), cells);
+    if (is_text) {
+      text.clear();
+      for (const std::uint64_t cell : cells) text += texts[static_cast<std::size_t>(cell + 1)];
+      append(text.data(), text.size() * sizeof(char32_t));
+      continue;
     }
-    if (!is_text) append(block.data(), count * 8);
+    for (std::size_t i = 0; i < cells.size() && as_double; ++i) {
+      const auto value = std::bit_cast<std::int64_t>(cells[i]);
+      cells[i] = std::bit_cast<std::uint64_t>(value == kMissingInteger ? std::numeric_limits<double>::quiet_NaN()
+                                                                       : static_cast<double>(value));
+    }
+    append(cells.data(), cells.size() * sizeof(std::uint64_t));
   }
 }
 
@@ -212,8 +304,9 @@ void NpzTable::close() {
     append(placeholder.data(), placeholder.size());
     const std::uint64_t begin = written_;
     crc_ = 0;
-    copy(spills_[i], described_[i]);
-    spills_[i].cells.reset();
+    pack(i);
+    copy(waiting_[i], described_[i]);
+    waiting_[i] = Waiting();
     member.size = written_ - begin;
     member.crc = crc_;
     // The checksum is known now.

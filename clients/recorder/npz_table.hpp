@@ -12,7 +12,9 @@ namespace kilotwin::recorder {
 
 class NpzTable final : public Table {
  public:
-  NpzTable(std::filesystem::path file, std::vector<Column> columns, const TableMetadata& metadata);
+  /// `most_waiting`: octets that wait in memory; more wait in temporary files.
+  NpzTable(std::filesystem::path file, std::vector<Column> columns, const TableMetadata& metadata,
+           std::size_t most_waiting = std::size_t{64} << 20);
 
   void integer(std::int64_t value) override;
   void number(double value) override;
@@ -27,24 +29,32 @@ class NpzTable final : public Table {
     void operator()(std::FILE* file) const { std::fclose(file); }
   };
   using File = std::unique_ptr<std::FILE, Close>;
-  /// A column's cells wait in a temporary file, because an array's header precedes them and says how many they are.
-  struct Spill {
-    File cells;  ///< 8 octets per cell; texts as numbers in the order of their first use
+  /// A column's cells wait until all rows are there, because an array's header precedes them and says how many they are. They wait in
+  /// blocks: whole numbers and texts in as few octets as the block's range needs. The blocks are in memory, or beyond most_waiting_ of
+  /// all columns in temporary files.
+  struct Waiting {
+    std::vector<std::uint64_t> cells;  ///< of the block at hand; texts as numbers in the order of their first use
+    std::string blocks;
+    File spilled;  ///< blocks before those; none: there are none
     bool any_missing = false;
     std::map<std::string, std::int64_t, std::less<>> texts{};
     std::vector<std::string> by_number{};
     std::size_t longest = 1;  ///< code points of the longest text
   };
   void put(std::uint64_t bits);
-  void copy(Spill& spill, const Column& column);
+  void pack(std::size_t column);
+  void spill();
+  /// The cells of a column after its array's header.
+  void copy(Waiting& waiting, const Column& column);
   void append(const void* octets, std::size_t size);
   [[noreturn]] void fail() const;
 
   const std::filesystem::path file_;
   const std::vector<Column> described_;
   const std::string comment_;
-  std::vector<Spill> spills_;
-  std::size_t cell_ = 0;
+  const std::size_t most_waiting_;
+  std::vector<Waiting> waiting_;
+  std::size_t cell_ = 0, packed_ = 0;  ///< packed_: octets of blocks in memory
   // The array at hand.
   File output_;
   std::uint64_t written_ = 0;

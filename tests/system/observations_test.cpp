@@ -16,6 +16,9 @@ namespace {
 /// Every robot shows what it should: variables that are known functions of its id and of the number of its loops.
 constexpr const char* kCountingProgram = R"(
 #include <kilolib.h>
+#ifndef RIGHT
+#define RIGHT kilo_straight_right
+#endif
 uint16_t beats;
 int16_t scores[3];
 struct { uint8_t mode : 3; float level; } state;
@@ -25,7 +28,7 @@ void setup(void) { note.type = NORMAL; note.crc = message_crc(&note); state.mode
   for (int i = 0; i < 3; ++i) scores[i] = kilo_uid * 10 + i - 5; }
 void loop(void) { ++beats; state.level = kilo_uid * 0.5f + beats;
   set_color(beats % 32 < 16 ? RGB(1, 0, 0) : RGB(0, 0, 3));
-  if (beats == 40) { spinup_motors(); set_motors(kilo_straight_left, kilo_straight_right); }
+  if (beats == 40) { spinup_motors(); set_motors(kilo_straight_left, RIGHT); }
   if (beats == 80) set_motors(kilo_turn_left, 0);
 #ifdef FAULT
   if (beats == 50 && kilo_uid == 3) *(volatile int*)8 = 1;
@@ -163,8 +166,9 @@ TEST_F(Observations, TheStationsPacketsAndLogsAndLifeCyclesAreExported) {
   for (const auto& row : table_of(exported("hub", "--events"))) {
     if (row.at("event") == "state") life[row.at("robot")].push_back(row.at("state"));
     if (row.at("event") != "station") continue;
-    EXPECT_EQ(row.at("text").size(), 20u) << "ten octets";
-    packets += row.at("text") != std::string(20, '0');
+    EXPECT_EQ(row.at("text").size(), 22u) << "ten octets";
+    EXPECT_TRUE(row.at("text").starts_with("0x"));
+    packets += row.at("text") != "0x" + std::string(20, '0');
   }
   // Beside those for robots, one starts them.
   const auto station = nlohmann::json::parse(read(scratch_.path() / "hub/summary.json")).at("station");
@@ -184,6 +188,65 @@ TEST_F(Observations, TheStationsPacketsAndLogsAndLifeCyclesAreExported) {
     EXPECT_NEAR(std::stod(logs[robot].at("y")), std::stod(poses[robot].at("y_mm")), 1e-3);
     EXPECT_NEAR(std::stod(logs[robot].at("orientation_deg")) * M_PI / 180,
                 std::stod(poses[robot].at("heading_rad")), 1e-4);
+  }
+}
+
+TEST_F(Observations, EventsOfAKindAreATableOfTheirOwn) {
+  run_observed("run");
+  const auto events = [&](const Words& kinds) {
+    Words words{"export", scratch_ / "run", "--events", "-"};
+    for (const std::string& kind : kinds) words.insert(words.end(), {"--kind", kind});
+    return kilotwin(words, scratch_);
+  };
+  const Table all = table_of(events({}).out), motions = table_of(events({"motion"}).out),
+              two = table_of(events({"motion", "sent"}).out);
+  const auto count = [&](const char* kind) {
+    return static_cast<std::size_t>(
+        std::count_if(all.begin(), all.end(), [&](const auto& row) { return row.at("event") == kind; }));
+  };
+  ASSERT_FALSE(motions.empty());
+  EXPECT_EQ(motions.size(), count("motion"));
+  EXPECT_EQ(two.size(), count("motion") + count("sent"));
+  EXPECT_EQ(motions[0].size(), 6u) << "time_s, event, robot, group, motor_left, motor_right";
+  for (const auto& row : motions) EXPECT_FALSE(row.at("motor_right").empty());
+  EXPECT_NE(events({"movement"}).err.find("there are led, motion, "), std::string::npos);
+  EXPECT_NE(events({"station"}).err.find("event: STATION"), std::string::npos);
+  EXPECT_EQ(events({"station"}).status, 2);
+}
+
+TEST_F(Observations, CommandsOfOtherDutiesThanTheCalibratedOnesAreNoted) {
+  run_observed("run");
+  const Words words{"export", scratch_ / "run", "--commands", scratch_ / "c.csv"};
+  EXPECT_EQ(kilotwin(words, scratch_).err, "");
+  run_observed("other", {"--mode", "local", "--define", "RIGHT=200"});
+  const Outcome other = kilotwin({"export", scratch_ / "other", "--commands", scratch_ / "c.csv"}, scratch_);
+  EXPECT_EQ(other.status, 0) << other.err;
+  EXPECT_NE(other.err.find("9 changes of motion, of 9 robots, are to other duties"), std::string::npos)
+      << other.err;
+  EXPECT_NE(other.err.find("The first: robot 0 at "), std::string::npos) << other.err;
+  EXPECT_NE(other.err.find(" and 200."), std::string::npos) << other.err;
+}
+
+TEST_F(Observations, PogosimsTablesComeBackAsTracksAndAsAnExperiment) {
+  run_observed("run");
+  std::string tracks;
+  for (const std::string ending : {".csv", ".feather"}) {
+    const std::string table = scratch_ / ("p" + ending), out = scratch_ / (ending.substr(1) + "/p.txtpb");
+    ASSERT_EQ(kilotwin({"export", scratch_ / "run", "--pogosim", table}, scratch_).status, 0);
+    const Outcome imported =
+        kilotwin({"import", table, "--out", out, "--behaviour", scratch_ / "observed.c"}, scratch_);
+    ASSERT_EQ(imported.status, 0) << imported.err;
+    EXPECT_NE(imported.out.find("600 by 600 mm"), std::string::npos) << imported.out;
+    EXPECT_NE(imported.out.find("not taken over"), std::string::npos) << imported.out;
+    EXPECT_EQ(kilotwin({"check", out}, scratch_).status, 0);
+    tracks = read(scratch_ / (ending.substr(1) + "/p-tracks/trajectories.csv"));
+    const Table poses = table_of(exported("run", "--trajectories")), back = table_of(tracks);
+    ASSERT_EQ(back.size(), poses.size());
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      EXPECT_EQ(back[i].at("robot"), poses[i].at("robot"));
+      for (const char* column : {"time_s", "x_mm", "y_mm", "heading_rad"})
+        EXPECT_NEAR(std::stod(back[i].at(column)), std::stod(poses[i].at(column)), 1e-4) << column;
+    }
   }
 }
 

@@ -117,6 +117,35 @@ TEST_F(Sweeps, ListTheRunsThatFailedAlsoWhereAllDid) {
   EXPECT_FALSE(fs::exists(scratch / "none/sweep.csv"));
 }
 
+TEST_F(Sweeps, StrictLeavesOutRunsInWhichRobotsFailed) {
+  write(scratch.path() / "p.c",
+        "#include <kilolib.h>\nstatic void setup(void) { if (kilo_uid == 3) *(volatile int*)8 = 1; }\n"
+        "static void loop(void) {}\nint main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
+  // Robot 3 fails, where there is one.
+  const Words points{"--set", "robots.count=2,4"};
+  const auto swept = [&](const Words& more) {
+    Words words = points;
+    words.insert(words.end(), more.begin(), more.end());
+    return sweep(words);
+  };
+  const Outcome lenient = swept({"--out", scratch / "lenient"});
+  EXPECT_EQ(lenient.status, 0) << lenient.err;
+  EXPECT_NE(lenient.err.find("robots failed in 1 of 2 runs"), std::string::npos) << lenient.err;
+  const Outcome strict = swept({"--strict", "--out", scratch / "strict"});
+  EXPECT_EQ(strict.status, 1) << strict.err;
+  EXPECT_NE(strict.err.find("1 of 4 robots failed"), std::string::npos) << strict.err;
+  EXPECT_EQ(strict.err.find("robots failed in"), std::string::npos) << strict.err;
+  EXPECT_NE(read(scratch / "strict/runs.csv").find("/0001-1,1,1,0,4,"), std::string::npos);
+  EXPECT_NE(read(scratch / "strict/sweep.csv").find("\nrobots.count=4,0,"), std::string::npos)
+      << "no run is in the mean\n"
+      << read(scratch / "strict/sweep.csv");
+  const std::string before = read(scratch / "strict/runs.csv");
+  const Outcome resumed = swept({"--strict", "--resume", scratch / "strict"});
+  EXPECT_EQ(resumed.status, 1) << resumed.err;
+  EXPECT_EQ(read(scratch / "strict/runs.csv"), before);
+  EXPECT_EQ(swept({"--resume", scratch / "strict"}).status, 2) << "another sweep";
+}
+
 TEST_F(Sweeps, AxesOfPlotsAreAsTheOptionsSay) {
   const auto plot = [&](const std::string& name, const Words& axes) {
     Words words{"--set", "robots.count=1..4", "--plot", "spread", "--out", scratch / name};

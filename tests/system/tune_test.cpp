@@ -61,6 +61,45 @@ int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }
   EXPECT_GT(json.at("best").at("WALK_TICKS"), 75);
 }
 
+TEST(TuneCommand, StrictLeavesOutRunsInWhichRobotsFailed) {
+  Scratch scratch;
+  write(scratch / "p.c", R"(#include "kilolib.h"
+void setup(void) { if (kilo_uid == 2 && LEVEL > 50) *(volatile int*)8 = 1; }
+void loop(void) {}
+int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }
+)");
+  write(scratch / "e.txtpb",
+        "duration_s: 0.2 arena { width_mm: 500 height_mm: 500 }\n"
+        "robots { count: 3 behaviour: \"p.c\" layout { grid { pitch_mm: 50 } } }\n");
+  const auto tune = [&](const std::string& out, const Words& more) {
+    Words words{"tune",
+                scratch / "e.txtpb",
+                "--quiet",
+                "--define",
+                "LEVEL=1",
+                "--vary-define",
+                "LEVEL=1..100",
+                "--maximise",
+                "spread",
+                "--seeds",
+                "2",
+                "--budget",
+                "52",
+                "--out",
+                scratch / out};
+    words.insert(words.end(), more.begin(), more.end());
+    return kilotwin(words, scratch);
+  };
+  const Outcome lenient = tune("lenient", {});
+  EXPECT_EQ(lenient.status, 0) << lenient.err;
+  EXPECT_NE(lenient.err.find("robots failed in"), std::string::npos) << lenient.err;
+  const Outcome strict = tune("strict", {"--strict"});
+  EXPECT_EQ(strict.status, 1) << strict.err;
+  EXPECT_NE(strict.err.find("--strict left them out"), std::string::npos) << strict.err;
+  const auto best = nlohmann::json::parse(read(scratch / "strict/tune.json")).at("best");
+  EXPECT_LE(best.at("LEVEL"), 50);
+}
+
 TEST(TuneCommand, TheWorstOfSeveralModelsDecides) {
   // Robots drive straight on for 3 s: at 1 mm/s by one model, at 20 mm/s by the other. The worst is the slow one's displacement, and
   // the mean lies halfway between both.

@@ -8,6 +8,7 @@
 
 #include "clients/cli/observable_choice.hpp"
 #include "clients/cli/sweep_runs.hpp"
+#include "clients/recorder/summary.hpp"
 
 namespace kilotwin::cli {
 
@@ -37,6 +38,11 @@ std::vector<double> Measurement::of_present(std::uint64_t first_seed, std::size_
   return measure(run_, first_seed, count);
 }
 
+void Measurement::note_failed_robots(const fs::path& run) {
+  const fs::path summary = run / "summary.json";
+  if (fs::exists(summary) && recorder::read_summary(summary).robots_failed > 0) ++runs_with_failed_robots_;
+}
+
 std::vector<double> Measurement::measure(const RunArguments& arguments, std::uint64_t first_seed,
                                          std::size_t count) {
   const std::size_t models = std::max<std::size_t>(1, goal_.models.size());
@@ -51,6 +57,7 @@ std::vector<double> Measurement::measure(const RunArguments& arguments, std::uin
   }
   std::vector<double> of_runs(runs.size(), std::nan(""));
   const auto ended = [&](const SweepRun& run) {
+    note_failed_robots(run.directory);
     if (run.well) {
       const double value = observable_at_end(run.directory, goal_.observable);
       of_runs[run.point] = goal_.largest ? value : -value;

@@ -41,8 +41,11 @@ class Measurement {
   /// Why the last run that failed did so; empty if none failed.
   [[nodiscard]] const std::string& last_failure() const { return last_failure_; }
   [[nodiscard]] bool interrupted() const { return interrupted_; }
+  /// Number of runs until now in which robots failed.
+  [[nodiscard]] std::size_t runs_with_failed_robots() const { return runs_with_failed_robots_; }
 
  private:
+  void note_failed_robots(const std::filesystem::path& run);
   [[nodiscard]] std::vector<double> measure(const RunArguments& arguments, std::uint64_t first_seed,
                                             std::size_t count);
 
@@ -53,7 +56,7 @@ class Measurement {
   const std::size_t at_a_time_;
   const std::function<void(std::size_t)> ran_;
   std::string last_failure_;
-  std::size_t runs_ = 0;
+  std::size_t runs_ = 0, runs_with_failed_robots_ = 0;
   bool interrupted_ = false;
 };
 

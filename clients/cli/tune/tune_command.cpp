@@ -140,7 +140,12 @@ int tune_experiment(TuneArguments arguments) {
              (directory / "points.csv").string(), (directory / "tune.json").string(),
              (directory / "search.svg").string(), (directory / "report.html").string(),
              place_in_words(directory, arguments.run.output, fallback));
-  return kDone;
+  const std::size_t failed = measurement.runs_with_failed_robots();
+  if (failed > 0)
+    say(fmt::format("kilotwin: robots failed in {} of {} runs; {}", failed, runs,
+                    arguments.run.strict ? "--strict left them out of the means"
+                                         : "--strict leaves such runs out of the means"));
+  return failed > 0 && arguments.run.strict ? kFailed : kDone;
 }
 
 }  // namespace
@@ -181,6 +186,7 @@ Command add_tune(CLI::App& program) {
           ->type_name("DIR|FILE...");
   models->excludes(app.get_option("--model"));
   app.add_flag("--worst", arguments->worst, "of several models, the worst counts and not the mean")->needs(models);
+  add_strict_option(app, arguments->run);
   app.add_option("--jobs", arguments->jobs, "runs at a time (default: one per core)")->type_name("N");
   app.add_flag("--quiet", arguments->quiet, "no progress");
   add_output_options(app, arguments->run.output, "runs/tune, with a number added if it exists");

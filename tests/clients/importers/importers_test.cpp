@@ -7,10 +7,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string>
 
 #include "clients/importers/imported.hpp"
+#include "clients/importers/pogosim_table.hpp"
 #include "clients/importers/tracker_log.hpp"
+#include "clients/recorder/table.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::importers {
@@ -299,6 +302,123 @@ TEST(PogosimImport, SurvivesAnyChangeOfItsFile) {
       kPogosim, [](std::string_view text, const std::string& name) { return from_pogosim(text, name); });
   EXPECT_GT(refused, 300);
   EXPECT_LT(refused, 3000);
+}
+
+/// A folder that goes with the object.
+class Folder {
+ public:
+  Folder() {
+    std::string name = (std::filesystem::temp_directory_path() / "kilotwin-import-XXXXXX").string();
+    path_ = ::mkdtemp(name.data());
+  }
+  ~Folder() { std::filesystem::remove_all(path_); }
+  [[nodiscard]] std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// A table of pogosim: robots 7 and 3 of "robots" at two times, robot 0 of "others" later. `ending` chooses the format.
+std::filesystem::path pogosim_table(const Folder& folder, const std::string& ending,
+                                    const recorder::TableMetadata& about) {
+  using recorder::CellType;
+  const auto file = folder / ("p" + ending);
+  const auto table = recorder::open_table(file,
+                                          {{"time", "s", CellType::kNumber},
+                                           {"robot_category", "", CellType::kText},
+                                           {"robot_id", "", CellType::kInteger},
+                                           {"pogobot_ticks", "", CellType::kInteger},
+                                           {"x", "mm", CellType::kNumber},
+                                           {"y", "mm", CellType::kNumber},
+                                           {"angle", "rad", CellType::kNumber}},
+                                          about);
+  struct Row {
+    double time_s;
+    const char* category;
+    int id;
+    double x_mm, y_mm, angle_rad;
+  };
+  const Row rows[] = {{0, "robots", 7, 100, 50, 1}, {0, "robots", 3, 200, 60, -2},
+                      {1, "robots", 7, 110, 50, 4}, {1, "others", 0, 300, 200, 0},
+                      {1, "robots", 3, NAN, 60, 0}, {2.5, "robots", 3, 210, 60, -2}};
+  for (const Row& row : rows) {
+    table->number(row.time_s);
+    table->text(row.category);
+    table->integer(row.id);
+    table->missing();
+    std::isnan(row.x_mm) ? table->missing() : table->number(row.x_mm);
+    table->number(row.y_mm);
+    table->number(row.angle_rad);
+    table->end_row();
+  }
+  table->close();
+  return file;
+}
+
+TEST(PogosimTable, BecomesTracksAndAnExperimentInBothFormats) {
+  const Folder folder;
+  for (const std::string ending : {".csv", ".feather"}) {
+    const ImportedTable table =
+        from_pogosim_table(pogosim_table(folder, ending, {{"arena_width_mm", "400"}, {"arena_height_mm", "300"}}));
+    // By category and number: robot 3 is 0, robot 7 is 1, and robot 0 of the other category is 2.
+    EXPECT_EQ(table.tracks,
+              "run,robot,time_s,x_mm,y_mm,heading_rad\np,1,0,-100,-100,1.000000\np,0,0,0,-90,-2.000000\n"
+              "p,1,1,-90,-100,-2.283185\np,2,1,100,50,0.000000\np,0,2.5,10,-90,-2.000000\n")
+        << ending;
+    const proto::Experiment& e = table.imported.experiment;
+    EXPECT_EQ(e.duration_s(), 3);
+    EXPECT_EQ(e.arena().width_mm(), 400);
+    EXPECT_EQ(e.arena().height_mm(), 300);
+    ASSERT_EQ(e.robots_size(), 2);
+    EXPECT_EQ(e.robots(0).count(), 2u);
+    EXPECT_EQ(e.robots(1).count(), 1u);
+    EXPECT_EQ(table.imported.poses.at(0).text, "x_mm,y_mm,heading_deg\n0,-90,-114.592\n-100,-100,57.2958\n");
+    EXPECT_EQ(table.imported.poses.at(1).text, "x_mm,y_mm,heading_deg\n100,50,0\n");
+    for (const char* words :
+         {"400 by 300 mm", "robot_category others: 1 robots", "robot_id: not 0 to 2",
+          "pogobot_ticks: not taken over", "1 rows have no position", "commands", "behaviour.c"})
+      EXPECT_TRUE(notes(table.imported, words)) << words;
+  }
+}
+
+TEST(PogosimTable, WithoutAnArenaAllPositionsFit) {
+  const Folder folder;
+  for (const std::string ending : {".csv", ".feather"}) {
+    const ImportedTable table = from_pogosim_table(pogosim_table(folder, ending, {}));
+    EXPECT_EQ(table.imported.experiment.arena().width_mm(), 317);
+    EXPECT_EQ(table.imported.experiment.arena().height_mm(), 217);
+    EXPECT_TRUE(notes(table.imported, "arena: not in the table")) << ending;
+  }
+}
+
+TEST(PogosimTable, OtherAndDamagedFilesAreRefused) {
+  const Folder folder;
+  const auto error = [&](const std::string& name, const std::string& content) -> std::string {
+    std::ofstream(folder / name, std::ios::binary) << content;
+    try {
+      static_cast<void>(from_pogosim_table(folder / name));
+    } catch (const UserError& e) {
+      return e.what();
+    }
+    return {};
+  };
+  EXPECT_NE(error("a.csv", "time,x,y\n").find("robot_category"), std::string::npos);
+  EXPECT_NE(error("b.feather", "no table").find("is no Arrow file"), std::string::npos);
+  const auto file = pogosim_table(folder, ".feather", {{"arena_width_mm", "400"}});
+  std::ifstream in(file, std::ios::binary);
+  const std::string whole((std::istreambuf_iterator<char>(in)), {});
+  EXPECT_EQ(error("whole.feather", whole), "");
+  // Whatever octet is another, the file is read or refused.
+  int refused = 0;
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    std::string changed = whole;
+    changed[i] = static_cast<char>(changed[i] ^ (i % 2 == 0 ? 0xff : 0x11));
+    refused += !error("changed.feather", changed).empty();
+  }
+  EXPECT_GT(refused, 200);
+  EXPECT_LT(refused, static_cast<int>(whole.size()));
+  for (std::size_t size = 0; size < whole.size(); size += 7)
+    EXPECT_NE(error("cut.feather", whole.substr(0, size)), "");
 }
 
 /// A file with a log, which goes with it.

@@ -16,6 +16,7 @@ try {
 const table = arrow.tableFromIPC(fs.readFileSync(feather));
 assert.deepEqual(table.schema.fields.map((field) => `${field.name}:${field.type}`), [
   "time:Float64", "robot_category:Utf8", "robot_id:Int64", "x:Float64", "y:Float64", "angle:Float64",
+  "pogobot_ticks:Int64",
 ]);
 const [header, ...rows] = fs.readFileSync(csv, "utf8").trim().split("\n").map((line) => line.trim().split(","));
 assert.equal(table.numRows, rows.length);

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <limits>
 
+#include "clients/recorder/npz_table.hpp"
 #include "core/base/error.hpp"
 #include "core/os/files.hpp"
 #include "core/os/process.hpp"
@@ -100,6 +102,47 @@ assert t["x_mm"][1] == -1.25 and np.isnan(t["x_mm"][2])
 assert list(t["state"]) == ["running", 'a "b", K\u00e4fer \U0001F41E', ""], t["state"]
 about = json.loads(zipfile.ZipFile(name).comment)
 assert about["seed"] == "7" and about["version"] == '1, "two"' and about["columns"][3]["unit"] == "mm"
+)");
+}
+
+TEST_F(TableTest, CellsThatWaitInFilesGiveTheSameArchive) {
+  const auto write = [&](const std::string& name, std::size_t most_waiting) {
+    NpzTable table(folder_ / name,
+                   {{"small", "", CellType::kInteger},
+                    {"wide", "", CellType::kInteger},
+                    {"gaps", "", CellType::kInteger},
+                    {"x_mm", "mm", CellType::kNumber},
+                    {"word", "", CellType::kText}},
+                   {}, most_waiting);
+    for (std::int64_t i = 0; i < 30'000; ++i) {
+      table.integer(i / 10'000 - 1);
+      table.integer(i % 2 == 0 ? std::numeric_limits<std::int64_t>::max() - i : -5'000'000'000 * i);
+      if (i % 3 == 0)
+        table.missing();
+      else
+        table.integer(70'000 * i);
+      table.number(std::sqrt(static_cast<double>(i)));
+      if (i % 5 == 0)
+        table.missing();
+      else
+        table.text("w" + std::to_string(i % 300));
+      table.end_row();
+    }
+    table.close();
+    return os::read_file(folder_ / name);
+  };
+  const std::string in_memory = write("memory.npz", std::size_t{1} << 30);
+  EXPECT_EQ(write("file.npz", 0), in_memory);
+  EXPECT_EQ(write("both.npz", 300'000), in_memory);
+  python("numpy", R"(
+import sys, numpy as np
+t = np.load(sys.argv[1] + "/both.npz")
+i = np.arange(30000)
+assert (t["small"] == i // 10000 - 1).all()
+assert (t["wide"] == np.where(i % 2 == 0, np.iinfo(np.int64).max - i, -5000000000 * i)).all()
+assert np.array_equal(t["gaps"], np.where(i % 3 == 0, np.nan, 70000.0 * i), equal_nan=True)
+assert (t["x_mm"] == np.sqrt(i)).all()
+assert list(t["word"]) == ["" if n % 5 == 0 else f"w{n % 300}" for n in i]
 )");
 }
 
