@@ -1,13 +1,17 @@
-// Parts of the search on small scenes: lag of the commands, travelling waves, uncertainty, traffic that fades.
+// Parts of the search on small scenes: lag of the commands, travelling waves, switches, uncertainty, traffic that fades, walls.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "clients/identify/fit/persistent_residuals.hpp"
 #include "clients/identify/fit/uncertainty.hpp"
 #include "clients/identify/fit/wall_detection.hpp"
 #include "clients/identify/model/effect_records.hpp"
 #include "clients/identify/search/search.hpp"
+#include "clients/identify/search/shape_refinement.hpp"
+#include "clients/identify/search/simplification.hpp"
 #include "clients/identify/search/travelling_waves.hpp"
 #include "tests/identify/small_set.hpp"
 #include "tests/identify/truth/effects.hpp"
@@ -60,6 +64,82 @@ TEST(TravellingWaves, AreFoundByTheirPeriodogram) {
   EXPECT_NEAR(numbers[0], 2 * M_PI * 0.8 / 420, 0.0015);
   EXPECT_NEAR(numbers[1], 2 * M_PI * 0.6 / 420, 0.0015);
   EXPECT_NEAR(numbers[2], 2 * M_PI / 70, 0.01);
+}
+
+TEST(TravellingWaves, GetTheirNumbersByLikelihood) {
+  const truth::Scene scene = small({truth::travelling_waves()});
+  const MeasuredSet set = set_of(scene, played(scene));
+  FitState state(set);
+  const Fitter fitter(set, 2);
+  fitter.fit_base(state);
+  const identify::Dictionary waves = identify::wave_dictionary_of(fitter, state, identify::extent_of(state.tracks));
+  ASSERT_FALSE(waves.hypotheses.empty());
+  identify::Term wave = waves.term_of(waves.hypotheses.front(), 1);
+  // A wrong start: 8 % too long, 5 % too slow.
+  std::vector<double>& start = wave.blocks.front().basis.factors.front().points;
+  start = {2 * M_PI * 0.8 / 420 / 1.08, 2 * M_PI * 0.6 / 420 / 1.08, 2 * M_PI / 70 / 1.05};
+  state.model.terms.push_back(wave);
+  fitter.fit(state, 2);
+  EXPECT_TRUE(identify::refine_wave_numbers(fitter, state, 0));
+  const std::vector<double>& found = state.model.terms.front().blocks.front().basis.factors.front().points;
+  EXPECT_NEAR(found[0], 2 * M_PI * 0.8 / 420, 0.00025);
+  EXPECT_NEAR(found[1], 2 * M_PI * 0.6 / 420, 0.00025);
+  EXPECT_NEAR(found[2], 2 * M_PI / 70, 0.0012);
+}
+
+struct Switch {
+  double instant_s, gain;
+};
+
+/// Curves of each robot over time, fitted to a scene, after their simplification: by robot.
+std::map<int, Switch> switches_of(const truth::Effect& effect) {
+  const truth::Scene scene = small({effect});
+  const MeasuredSet set = set_of(scene, played(scene));
+  FitState state(set);
+  const Fitter fitter(set, 2);
+  fitter.fit_base(state);
+  const identify::Dictionary dictionary = identify::dictionary_of(identify::extent_of(state.tracks));
+  const auto curves =
+      std::find_if(dictionary.hypotheses.begin(), dictionary.hypotheses.end(),
+                   [](const identify::Hypothesis& h) { return h.name == "speed-by-robot-and-time"; });
+  if (curves == dictionary.hypotheses.end()) return {};
+  state.model.terms.push_back(dictionary.term_of(*curves, 1));
+  fitter.fit(state, 2);
+  identify::refine_curves(fitter, state, 0);
+  if (!identify::simplify_to_switch(fitter, state, 0)) return {};
+  std::map<int, Switch> switches;
+  const identify::Term& term = state.model.terms.front();
+  Eigen::Index column = 0;
+  for (const identify::Block& block : term.blocks) {
+    const identify::Factor &begins = block.basis.factors.at(0), &robots = block.basis.factors.at(1);
+    EXPECT_EQ(begins.shape, identify::Factor::Shape::kAtLeast);
+    for (const double robot : robots.points)
+      switches[static_cast<int>(robot)] = {begins.points.at(0), term.coefficients[column++]};
+  }
+  return switches;
+}
+
+void expect_switches(const std::map<int, Switch>& found, const std::map<int, double>& instants_s) {
+  for (const auto& [robot, instant_s] : instants_s) {
+    ASSERT_TRUE(found.contains(robot)) << robot;
+    EXPECT_NEAR(found.at(robot).instant_s, instant_s, 1.5) << robot;
+    EXPECT_NEAR(found.at(robot).gain, -0.4, 0.1) << robot;
+  }
+  // Robots that do not fail: the speed of a robot in a part of a run is known to some per cent only.
+  for (const auto& [robot, one] : found) {
+    if (instants_s.contains(robot)) continue;
+    EXPECT_LT(std::abs(one.gain), 0.12) << robot;
+  }
+}
+
+TEST(Switches, AreOneInstantOfAllRobots) {
+  const std::map<int, Switch> found = switches_of(truth::robots_that_fail());
+  expect_switches(found, {{1, 83.7}, {4, 83.7}, {7, 83.7}});
+  for (const auto& [robot, one] : found) EXPECT_EQ(one.instant_s, found.at(1).instant_s) << robot;
+}
+
+TEST(Switches, AreOneInstantOfEachRobot) {
+  expect_switches(switches_of(truth::failures_in_turn()), {{1, 31.3}, {4, 56.3}, {7, 81.3}});
 }
 
 TEST(Uncertainty, HoldsTheTrueBiases) {
@@ -121,6 +201,23 @@ TEST(Walls, TheLastOneFollowsFromTheOthers) {
   EXPECT_NEAR(walls.y_low_mm, -wall_mm, 1);
   // The centre of this arena is not the origin.
   EXPECT_TRUE(std::isinf(keep(30).y_low_mm));
+}
+
+TEST(Walls, TheLastOneFollowsWithoutHeadings) {
+  truth::Scene scene = small({});
+  scene.heading = false;
+  scene.tracked_ahead_mm = 0;
+  scene.width_mm = scene.height_mm = 450;
+  MeasuredSet set = set_of(scene, played(scene));
+  const double wall_mm = scene.height_mm / 2 - 16.5;
+  // No robot comes near the lower wall.
+  for (identify::Run& run : set.runs)
+    for (identify::Track& track : run.tracks)
+      std::erase_if(track.samples, [&](const identify::Sample& s) { return s.y_mm < -wall_mm + 25; });
+  FitState base(set);
+  Fitter(set, 2).fit_base(base);
+  EXPECT_NEAR(base.model.walls.y_high_mm, wall_mm, 2);
+  EXPECT_NEAR(base.model.walls.y_low_mm, -wall_mm, 2);
 }
 
 }  // namespace

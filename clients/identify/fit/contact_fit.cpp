@@ -80,10 +80,8 @@ void Fitter::fit_walls(FitState& state) const {
       Side{&Walls::y_high_mm, &Sample::y_mm, 1}, Side{&Walls::y_low_mm, &Sample::y_mm, -1}};
   Walls reached;
   for (const Side& side : sides) {
-    // With headings, detected_walls() has found most walls already. Under a distorted camera they may be those of an earlier map.
-    const double known = side.sign * model.walls.*side.wall;
-    const bool stays = headings_ && std::isfinite(known);
-    if (stays && !measures) continue;
+    // With headings, detected_walls() has found most walls already.
+    if (headings_ && std::isfinite(model.walls.*side.wall)) continue;
     std::vector<double> places;
     for (const TrackView& view : state.tracks.views())
       for (const Sample& s : view.track->samples) places.push_back(side.sign * place_of(view, s).*side.along);
@@ -103,11 +101,11 @@ void Fitter::fit_walls(FitState& state) const {
           [&](const Sample& s) { return std::abs(side.sign * place_of(view, s).*side.along - edge) < reach + 5; });
       if (there > 5) near.push_back(&view);
     }
-    if (!stays) model.walls.*side.wall = side.sign * std::numeric_limits<double>::infinity();
+    model.walls.*side.wall = side.sign * std::numeric_limits<double>::infinity();
     if (near.empty()) continue;
     MotionModel best = model;
     // Penalty of a wall, in log likelihood: covers chance and a few outliers.
-    double best_value = log_likelihood_with_contacts(model, near) + (stays ? 0 : 30);
+    double best_value = log_likelihood_with_contacts(model, near) + 30;
     const auto try_at = [&](double wall) {
       MotionModel trial = model;
       trial.walls.*side.wall = side.sign * wall;
@@ -116,10 +114,7 @@ void Fitter::fit_walls(FitState& state) const {
       best_value = value;
       best = trial;
     };
-    constexpr double kMostMoved_mm = 12;
-    const double from = stays ? known - kMostMoved_mm : edge - 2,
-                 to = stays ? known + kMostMoved_mm : edge + reach + 2;
-    for (double wall = from; wall <= to; wall += 2) try_at(wall);
+    for (double wall = edge - 2; wall <= edge + reach + 2; wall += 2) try_at(wall);
     const double found = side.sign * best.walls.*side.wall;
     if (std::isinf(found)) continue;
     for (const double by : {-1.0, 1.0, -0.5, 0.5}) try_at(found + by);

@@ -635,4 +635,52 @@ Effect mosaic(double strength) {
           }};
 }
 
+Effect failures_in_turn(double strength) {
+  return {
+      "failures-in-turn",
+      "robots 1, 4, 7... run at 0.6 of their speed, each from an instant of its own on: 31.3 s, 56.3 s, 81.3 s...",
+      {{"robot", "time"}},
+      {"position", "measurement"},
+      [=](const Situation& at, Push& push) {
+        if (at.robot % 3 == 1 && at.time_s >= 31.3 + 25 * (at.robot / 3) - 1e-9)
+          slow_both(push, 1 - 0.4 * strength);
+      },
+      {}};
+}
+
+Effect late_patch_of_some(double strength) {
+  return {"late-patch-of-some",
+          "from 71.7 s on robots with even numbers run at 1 - 0.5 / (1 + exp(-(x + 20 mm) / 30 mm)) of their speed",
+          {{"robot", "time"}, {"robot", "position"}, {"position", "time"}},
+          {"measurement"},
+          [=](const Situation& at, Push& push) {
+            if (at.robot % 2 == 0 && at.time_s >= 71.7 - 1e-9)
+              slow_both(push, 1 - 0.5 * strength / (1 + std::exp(-(at.disc.x + 20) / 30)));
+          },
+          {}};
+}
+
+Effect veering_robots(double strength) {
+  return {"veering-robots",
+          "robots 1, 4, 7... turn at 0.1 rad/s while driven, from 64.6 s on",
+          {{"robot", "time"}},
+          {"position", "measurement"},
+          [=](const Situation& at, Push& push) {
+            if (at.robot % 3 == 1 && at.driven() && at.time_s >= 64.6 - 1e-9) push.turn_rad_s += 0.1 * strength;
+          },
+          {}};
+}
+
+Effect boards(double strength) {
+  return {"boards",
+          "speed is 1 - 0.4 max(0, cos(2 pi (0.6 x - 0.8 y) / 110 mm)): boards that lie diagonally",
+          {{"position"}},
+          {"robot", "measurement", "time"},
+          [=](const Situation& at, Push& push) {
+            const double phase = 2 * kPi * (0.6 * at.disc.x - 0.8 * at.disc.y) / 110;
+            slow_both(push, 1 - 0.4 * strength * std::max(0.0, std::cos(phase)));
+          },
+          {}};
+}
+
 }  // namespace kilotwin::truth

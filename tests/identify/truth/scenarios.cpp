@@ -178,6 +178,13 @@ const Entry kEntries[] = {
      }},
     {"knocked-ahead", "the same with discs 9.2 mm ahead of the drive",
      [] { return with(tidy_lab(), Effects{camera_knock()}); }},
+    {"failures", "robot and time: robots fail one after another",
+     [] { return with(tidy_lab(), Effects{failures_in_turn()}); }},
+    {"late-some", "robot, time and position: some robots, from some time on, in a part of the room",
+     [] { return with(tidy_lab(), Effects{late_patch_of_some()}); }},
+    {"veering", "robot and time: some robots veer from some time on",
+     [] { return with(blind_lab(), Effects{veering_robots()}); }},
+    {"boards", "position: boards that lie diagonally", [] { return with(tidy_lab(), Effects{boards()}); }},
     // Two effects at once.
     {"fatigue-lens", "motor_time and measurement",
      [] {
