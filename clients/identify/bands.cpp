@@ -99,7 +99,136 @@ std::vector<Place> places_of(const Basis& basis) {
                                                                                 : std::vector<Place>{};
 }
 
+/// The blocks of a term that act on one target under the same commands: their values add up.
+using Group = std::vector<std::size_t>;
+std::vector<Group> groups_of(const Term& term) {
+  std::vector<Group> groups;
+  for (std::size_t b = 0; b < term.blocks.size(); ++b) {
+    const Block& block = term.blocks[b];
+    const auto with = std::find_if(groups.begin(), groups.end(), [&](const Group& group) {
+      const Block& first = term.blocks[group.front()];
+      return first.target == block.target && first.during == block.during;
+    });
+    (with == groups.end() ? groups.emplace_back() : *with).push_back(b);
+  }
+  return groups;
+}
+
+/// Whether a basis is one function of coefficients that were estimated, and depends on what `fits` accepts.
+template <class Fits> bool is_open(const Basis& basis, Fits&& fits) {
+  if (basis.factors.empty()) return true;
+  const Factor& factor = basis.factors.front();
+  return basis.factors.size() == 1 && factor.known.empty() && factor.shape != Shape::kTravelling &&
+         factor.shape != Shape::kGrid && fits(factor);
+}
+
+/// The sum of a group at a situation.
+ValueWithSd sum_of(const MotionModel& model, std::size_t t, const Group& group, const Situation& at,
+                   const Eigen::MatrixXd& covariance) {
+  const Term& term = model.terms[t];
+  Eigen::VectorXd columns = Eigen::VectorXd::Zero(term.coefficients.size());
+  Eigen::Index first = 0;
+  for (std::size_t b = 0; b < term.blocks.size(); ++b) {
+    const Basis& basis = term.blocks[b].basis;
+    const auto own = static_cast<Eigen::Index>(basis.size());
+    if (std::find(group.begin(), group.end(), b) != group.end()) {
+      std::array<double, kMostColumns> values;  // evaluate() needs room for products that are not in use, too
+      basis.evaluate(at, 0, values.data());
+      columns.segment(first, own) = Eigen::Map<const Eigen::VectorXd>(values.data(), own);
+    }
+    first += own;
+  }
+  Eigen::Index before = kBaseColumns;
+  for (std::size_t k = 0; k < t; ++k) before += model.terms[k].coefficients.size();
+  const Eigen::Index n = columns.size();
+  const double variance = columns.dot(covariance.block(before, before, n, n) * columns);
+  return {columns.dot(term.coefficients), std::sqrt(std::max(0.0, variance))};
+}
+
+double factor_of(const std::string& unit) { return unit == "%" ? 100 : unit == "degrees" ? 180 / M_PI : 1; }
+
+/// Values with their standard deviations, if they are the drawn ones.
+struct Drawn {
+  std::vector<double> value;
+  std::vector<Situation> at;
+  double factor;
+};
+std::optional<std::vector<double>> sd_of(const Drawn& drawn, const MotionModel& model, std::size_t term,
+                                         const Group& group, const Eigen::MatrixXd& covariance) {
+  constexpr double kAlike = 0.03;  // of the largest value: splines through knots of the basis
+  double most = 0, off = 0;
+  std::vector<double> sd;
+  for (std::size_t i = 0; i < drawn.value.size(); ++i) {
+    const ValueWithSd v = sum_of(model, term, group, drawn.at[i], covariance);
+    most = std::max(most, std::abs(drawn.value[i]));
+    off = std::max(off, std::abs(drawn.factor * v.value - drawn.value[i]));
+    sd.push_back(drawn.factor * v.sd);
+  }
+  return off <= kAlike * most ? std::optional(sd) : std::nullopt;
+}
+
 }  // namespace
+
+void set_band(identification::EffectCurve& curve, const MotionModel& model, std::size_t term,
+              const Uncertainty& uncertainty) {
+  for (const Group& group : groups_of(model.terms[term])) {
+    const auto& blocks = model.terms[term].blocks;
+    if (blocks[group.front()].basis.factors.empty()) continue;
+    const Axis axis = blocks[group.front()].basis.factors.front().axis;
+    const auto along = [&](const Factor& factor) { return !factor.of_two() && factor.axis == axis; };
+    if (!std::all_of(group.begin(), group.end(), [&](std::size_t b) { return is_open(blocks[b].basis, along); }))
+      continue;
+    Drawn drawn{{curve.value().begin(), curve.value().end()}, {}, factor_of(curve.acts_on_unit())};
+    for (int i = 0; i < curve.at_size(); ++i) {
+      // The lower of two values at a step holds before it.
+      constexpr double kBefore = 1e-6;
+      const double before = i + 1 < curve.at_size() && curve.at(i + 1) == curve.at(i) ? kBefore : 0;
+      if (const auto s = situation_at(axis, curve.at(i) / factor_of(curve.unit()) - before)) drawn.at.push_back(*s);
+    }
+    if (drawn.at.size() != drawn.value.size()) continue;
+    const auto sd = sd_of(drawn, model, term, group, uncertainty.covariance);
+    if (!sd) continue;
+    for (int i = 0; i < curve.at_size(); ++i) {
+      const double half = stats::kNormal95 * (*sd)[static_cast<std::size_t>(i)];
+      curve.add_low(curve.value(i) - half);
+      curve.add_high(curve.value(i) + half);
+    }
+    return;
+  }
+}
+
+void set_band(identification::EffectMap& map, const MotionModel& model, std::size_t term,
+              const Uncertainty& uncertainty) {
+  Drawn drawn{{}, {}, factor_of(map.unit())};
+  for (int j = 0; j < map.y_mm_size(); ++j) {
+    for (int i = 0; i < map.x_mm_size(); ++i) {
+      Situation& s = drawn.at.emplace_back();
+      s.x_mm = map.x_mm(i);
+      s.y_mm = map.y_mm(j);
+      drawn.value.push_back(map.effect(j).values(i).number_value());
+    }
+  }
+  const auto of_place = [](const Factor& factor) {
+    const auto is = [](const Axis& axis) { return axis.of == Covariate::kX || axis.of == Covariate::kY; };
+    return is(factor.axis) && (!factor.of_two() || is(factor.and_axis));
+  };
+  for (const Group& group : groups_of(model.terms[term])) {
+    const auto& blocks = model.terms[term].blocks;
+    if (!std::all_of(group.begin(), group.end(), [&](std::size_t b) { return is_open(blocks[b].basis, of_place); }))
+      continue;
+    const auto sd = sd_of(drawn, model, term, group, uncertainty.covariance);
+    if (!sd) continue;
+    for (int j = 0; j < map.y_mm_size(); ++j) {
+      JsonList &low = *map.add_low(), &high = *map.add_high();
+      for (int i = 0; i < map.x_mm_size(); ++i) {
+        const auto at = static_cast<std::size_t>(j * map.x_mm_size() + i);
+        *low.add_values() = json_value(drawn.value[at] - stats::kNormal95 * (*sd)[at]);
+        *high.add_values() = json_value(drawn.value[at] + stats::kNormal95 * (*sd)[at]);
+      }
+    }
+    return;
+  }
+}
 
 JsonList bands_of(const MotionModel& model, std::size_t term, const Uncertainty& uncertainty) {
   JsonList bands;

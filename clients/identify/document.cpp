@@ -416,6 +416,11 @@ void add_robots(identification::Result& out, const Findings& f, const MeasuredSe
     entry.set_bias_right_mm_s(bias.mean_mm_s[1]);
     entry.set_sd_left_mm_s(std::sqrt(covariance(0, 0)));
     entry.set_sd_right_mm_s(std::sqrt(covariance(1, 1)));
+    if (const auto ratio = f.noise_ratios.find(robot); ratio != f.noise_ratios.end()) {
+      entry.set_noise_ratio(ratio->second.value);
+      entry.set_noise_ratio_low(ratio->second.low);
+      entry.set_noise_ratio_high(ratio->second.high);
+    }
     if (const auto sums = by_robot.find(robot); sums != by_robot.end() && sums->second[2] > 0) {
       entry.set_before_mm(std::sqrt(sums->second[0] / sums->second[2]));
       entry.set_after_mm(std::sqrt(sums->second[1] / sums->second[2]));
@@ -457,8 +462,13 @@ identification::Result result_of(const Findings& f, const MeasuredSet& judged, d
   identification::Result out;
   add_errors(out, f, horizon_s);
   *out.mutable_effects() = effects_of(f);
+  for (const NoiseEffect& effect : f.noise_effects) *out.add_effects() = entry_of(effect);
   if (const double lag_s = after.base.command_lag_s; lag_s != 0) {
     out.mutable_command_lag()->set_lag_s(lag_s);
+    if (f.command_lag_s) {
+      out.mutable_command_lag()->set_low_s(f.command_lag_s->first);
+      out.mutable_command_lag()->set_high_s(f.command_lag_s->second);
+    }
     out.mutable_command_lag()->set_in_words(
         fmt::format("The tracks follow the commands {:.3f} s {} than stamped. The fit allows for it; check the "
                     "clocks of tracker and commands.",
@@ -477,6 +487,8 @@ identification::Result result_of(const Findings& f, const MeasuredSet& judged, d
   *out.mutable_disc_centre() = disc_centre_of(after);
   add_robots(out, f, judged);
   *out.mutable_noise() = noise_of(after.noise);
+  *out.mutable_noise_low() = noise_of(f.noise.low);
+  *out.mutable_noise_high() = noise_of(f.noise.high);
   *out.mutable_walls() = walls_of(after.walls);
   return out;
 }
@@ -487,11 +499,17 @@ identification::Identification document_of(const Findings& f, const MeasuredSet&
                                            double horizon_s, std::uint32_t threads) {
   identification::Identification out;
   *out.mutable_result() = result_of(f, test != nullptr ? *test : train, horizon_s);
-  for (const Term& term : f.found.fit.model.terms) {
-    const std::vector<proto::Effect> written = effects_of_term(term);
-    for (identification::EffectCurve& curve : curves_of(term.name, written))
+  const MotionModel& model = f.found.fit.model;
+  for (std::size_t t = 0; t < model.terms.size(); ++t) {
+    const std::vector<proto::Effect> written = effects_of_term(model.terms[t]);
+    for (identification::EffectCurve& curve : curves_of(model.terms[t].name, written)) {
+      set_band(curve, model, t, f.uncertainty);
       *out.add_effect_curves() = std::move(curve);
-    for (identification::EffectMap& map : maps_of(term.name, written)) *out.add_effect_maps() = std::move(map);
+    }
+    for (identification::EffectMap& map : maps_of(model.terms[t].name, written)) {
+      set_band(map, model, t, f.uncertainty);
+      *out.add_effect_maps() = std::move(map);
+    }
   }
   *out.mutable_set() = describe_set(train, test, f.held_out);
   for (const Step& step : f.found.steps) {

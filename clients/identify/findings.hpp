@@ -1,13 +1,17 @@
 /// What an identification from trajectories found, before it is written.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "clients/identify/fit/noise_fit.hpp"
+#include "clients/identify/fit/noise_samples.hpp"
 #include "clients/identify/fit/numbering.hpp"
 #include "clients/identify/fit/uncertainty.hpp"
+#include "clients/identify/noise_effects.hpp"
 #include "clients/identify/predict/evaluation.hpp"
 #include "clients/identify/predict/held_out_gain.hpp"
 #include "clients/identify/search/search.hpp"
@@ -49,7 +53,12 @@ struct Findings {
   Unexplained unexplained;
   Numbering numbering;      ///< of the robots, by the base model
   Uncertainty uncertainty;  ///< of the written model
-  std::string model_file;   ///< where the model will stand
+  NoiseInterval noise;      ///< of its noise
+  /// Ends of the 95 % interval of its lag, if it has one.
+  std::optional<std::pair<double, double>> command_lag_s;
+  std::map<std::uint32_t, NoiseRatio> noise_ratios;  ///< by robot
+  std::vector<NoiseEffect> noise_effects;
+  std::string model_file;  ///< where the model will stand
 };
 
 }  // namespace kilotwin::identify

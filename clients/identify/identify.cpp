@@ -207,6 +207,11 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   // An effect that the base model lacks makes the robots' speeds differ from run to run.
   if (f.numbering.anew()) f.numbering = numbering_of(fitter, f.found.fit);
   f.uncertainty = uncertainty_of(fitter, f.found.fit);
+  f.noise = fitter.noise_interval(f.found.fit);
+  if (f.found.fit.model.base.command_lag_s != 0) f.command_lag_s = fitter.command_lag_interval(f.found.fit);
+  const std::vector<NoiseSample> noise_samples = noise_samples_of(f.found.fit, options.threads);
+  f.noise_ratios = noise_ratios_of(noise_samples);
+  if (options.find_effects) f.noise_effects = find_noise_effects(noise_samples);
 
   Identified out;
   out.predictions = predictions_of(f, evaluation.set());
@@ -215,8 +220,12 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   add_horizon(out.found, f, evaluation, options.threads);
   say_progress(0.95, "simulation check");
   out.model = proto_of(f.found.fit.model);
+  write_noise_effects(out.model, f.found.fit.model.noise, f.noise_effects);
   const PosteriorDraws posterior(f.found.fit.model, f.uncertainty);
-  for (std::uint32_t n = 1; n <= options.draws; ++n) out.draws.push_back(proto_of(posterior.draw(kDrawsSeed, n)));
+  for (std::uint32_t n = 1; n <= options.draws; ++n) {
+    out.draws.push_back(proto_of(posterior.draw(kDrawsSeed, n)));
+    write_noise_effects(out.draws.back(), f.found.fit.model.noise, f.noise_effects);
+  }
   const proto::Model written_before = proto_of(f.base.model);
   // Simulations give no error that a choice could make too small: all held-out tracks count.
   const Tracks compared = test != nullptr ? Tracks::kAll : Tracks::kHeldOut;

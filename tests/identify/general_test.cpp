@@ -38,6 +38,10 @@ TEST(CommandLag, IsFittedInPlaceOfEffects) {
     for (const identify::Term& term : found.fit.model.terms)
       ADD_FAILURE() << term.name << " at a lag of " << lag_s << " s";
     EXPECT_NEAR(found.fit.model.base.command_lag_s, lag_s, 0.02);
+    const auto [low_s, high_s] = fitter.command_lag_interval(found.fit);
+    EXPECT_LT(low_s, lag_s);
+    EXPECT_GT(high_s, lag_s);
+    EXPECT_LT(high_s - low_s, 0.1);
   }
 }
 

@@ -249,8 +249,11 @@ class Coverage {
  public:
   void add(const std::string& parameter, double truth, double value, double sd) {
     constexpr double kNormal95 = 1.96;
+    add_interval(parameter, truth, value - kNormal95 * sd, value + kNormal95 * sd);
+  }
+  void add_interval(const std::string& parameter, double truth, double low, double high) {
     auto& [held, all] = counts_[parameter];
-    held += std::abs(value - truth) <= kNormal95 * sd ? 1 : 0;
+    held += low <= truth && truth <= high ? 1 : 0;
     ++all;
   }
   void print() const {
@@ -281,6 +284,7 @@ int judge_coverage(const Arguments& arguments, const fs::path& folder) {
         scene.wheel_base_mm += 2 * dice.normal();
         scene.straight_mm_s += 1 * dice.normal();
         scene.turn_mm_s += 2 * dice.normal();
+        scene.bias_mean_mm_s += scene.bias_sd_mm_s / 2 * dice.normal();
         const Verdict verdict = try_scene(arguments, scene, seed, 1, folder / scene.name);
         const std::lock_guard lock(mutex);
         if (!verdict.failure.empty()) {
@@ -300,6 +304,16 @@ int judge_coverage(const Arguments& arguments, const fs::path& folder) {
         base("wheel_base_mm", scene.wheel_base_mm);
         base("tracked_point_ahead_mm", scene.tracked_ahead_mm);
         base("tracked_point_left_mm", 0);
+        const auto noise = [&](const char* parameter, double truth) {
+          const nlohmann::json &low = result.at("noise_low").at(parameter),
+                               &high = result.at("noise_high").at(parameter);
+          // Null: a variance that may be as large as any.
+          coverage.add_interval(parameter, truth, low.get<double>(),
+                                high.is_null() ? INFINITY : high.get<double>());
+        };
+        noise("tracker_position_sd_mm", scene.tracker_sd_mm);
+        if (scene.heading) noise("tracker_heading_sd_rad", scene.heading_sd_rad);
+        noise("factor_variance_s", scene.factor_sd * scene.factor_sd * scene.step_s);
         for (const nlohmann::json& robot : result.at("robots")) {
           const Wheels<double>& bias = played.individuals.at(robot.at("robot").get<std::size_t>()).bias_mm_s;
           coverage.add("bias_left_mm_s", bias.left, robot.at("bias_left_mm_s"), robot.at("sd_left_mm_s"));

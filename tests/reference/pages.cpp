@@ -23,6 +23,7 @@ std::string read_text(const std::filesystem::path& path) {
 Regions regions(const std::filesystem::path& sources, const std::filesystem::path& program) {
   return {{"experiment", [] { return experiment_schema(KILOTWIN_SCHEMA); }},
           {"model", [] { return model_schema(KILOTWIN_SCHEMA); }},
+          {"result-keys", [] { return result_keys(KILOTWIN_SCHEMA); }},
           {"topics", [sources] { return "```idl\n" + read_text(sources / "idl" / "public.idl") + "```\n"; }},
           {"limits", [] { return limits_table(); }},
           {"counters", [] { return counters_table(); }},

@@ -16,14 +16,15 @@ namespace kilotwin::reference {
 /// Text of a region by its name.
 using Regions = std::map<std::string, std::function<std::string()>>;
 
-/// Regions `experiment`, `model`, `topics`, `limits`, `counters` and `commands`. `sources`: the repository; `program`: kilotwin.
+/// Regions `experiment`, `model`, `result-keys`, `topics`, `limits`, `counters` and `commands`. `sources`: the repository; `program`:
+/// kilotwin.
 [[nodiscard]] Regions regions(const std::filesystem::path& sources, const std::filesystem::path& program);
 
 /// The page with each of its regions made anew. Throws std::runtime_error where a region is unknown or has no end.
 [[nodiscard]] std::string regenerated(const std::string& page, const Regions& regions);
 
 /// Pages with generated regions, of docs/reference.
-inline constexpr const char* kPages[] = {"experiment.md", "model.md",       "topics.md",
+inline constexpr const char* kPages[] = {"experiment.md", "model.md",       "result-keys.md", "topics.md",
                                          "limits.md",     "observables.md", "commands.md"};
 
 /// The text of a file. Throws std::runtime_error where it cannot be read.

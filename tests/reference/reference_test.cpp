@@ -2,10 +2,12 @@
 #include <google/protobuf/descriptor.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <regex>
 #include <set>
+#include <sstream>
 #include <stdexcept>
 
 #include "core/experiment/text_file.hpp"
@@ -26,7 +28,9 @@ TEST_P(Page, IsWhatItsSourcesSay) {
 }
 
 std::string name_of(const testing::TestParamInfo<const char*>& page) {
-  return std::filesystem::path{page.param}.stem().string();
+  std::string name = std::filesystem::path{page.param}.stem().string();
+  std::replace(name.begin(), name.end(), '-', '_');  // names of tests are identifiers
+  return name;
 }
 INSTANTIATE_TEST_SUITE_P(Reference, Page, testing::ValuesIn(kPages), name_of);
 
@@ -57,6 +61,27 @@ TEST(ReferencePages, SchemaPagesHaveARowForEveryField) {
     }
   }
   EXPECT_GT(found.size(), 30u);
+}
+
+/// Every key of result.json says what it holds, unless its name does.
+TEST(ReferencePages, KeysOfResultsHaveMeanings) {
+  static const std::set<std::string> named = {"name", "unit", "run",  "in_words",
+                                              "area", "low",  "high", "parameters"};
+  std::istringstream page{read_text(kSources / "docs/reference/result-keys.md")};
+  static const std::regex row{"\\| `([a-z0-9_]+)` \\|.*\\| ([^|]*)\\|"};
+  std::size_t rows = 0;
+  std::string section;
+  for (std::string line; std::getline(page, line);) {
+    if (line.starts_with("### ")) section = line.substr(4);
+    std::smatch found;
+    if (section.starts_with("Radio") || section == "PopulationClass" || !std::regex_match(line, found, row))
+      continue;
+    ++rows;
+    const std::string meaning = found[2];
+    EXPECT_TRUE(named.contains(found[1]) || meaning.find_first_not_of(' ') != std::string::npos)
+        << section << "." << found[1] << ": comment it in idl/identification.proto";
+  }
+  EXPECT_GT(rows, 150U);
 }
 
 /// Whether a path of a page leads somewhere: "core/os" and "core/os/files.hpp" exist, "core/os/files.*" has some ending.

@@ -11,6 +11,8 @@
 #include <set>
 #include <sstream>
 #include <stdexcept>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/experiment/fields.hpp"
@@ -41,7 +43,9 @@ class Schema {
   }
 
   [[nodiscard]] const pb::Descriptor& message(const std::string& name) const {
-    return *pool_.FindMessageTypeByName("kilotwin.proto." + name);
+    const pb::Descriptor* const found = pool_.FindMessageTypeByName("kilotwin." + name);
+    if (found == nullptr) throw std::runtime_error(fmt::format("there is no message {}", name));
+    return *found;
   }
 
  private:
@@ -95,6 +99,11 @@ std::string anchor(std::string_view title) {
 /// The page that has the section of a type.
 std::string page_of(const pb::FileDescriptor& file) {
   return file.name() == "experiment.proto" || file.name() == "door.proto" ? "experiment.md" : "model.md";
+}
+
+/// A section of the same page.
+std::string link_to(const pb::Descriptor& type) {
+  return fmt::format("[{}](#{})", type.name(), anchor(type.name()));
 }
 
 template <typename Type> std::string link_to(const Type& type, const pb::FileDescriptor& from) {
@@ -170,13 +179,80 @@ std::string sections(const Schema& schema, const std::string& root) {
   return page + "\n";
 }
 
+/// The unit that a key's ending states.
+std::string unit_of_key(std::string_view key) {
+  constexpr std::pair<std::string_view, std::string_view> kUnits[] = {
+      {"_rad_s", "rad/s"}, {"_mm_s", "mm/s"}, {"_variance_s", "s"}, {"_rad", "rad"},
+      {"_mm", "mm"},       {"_db", "dB"},     {"_s", "s"}};
+  for (const auto& [ending, unit] : kUnits)
+    if (key.ends_with(ending)) return std::string{unit};
+  return "";
+}
+
+/// What stands behind a key of result.json.
+std::string value_of_key(const FieldDescriptor& field) {
+  if (field.is_map()) {
+    const FieldDescriptor& value = *field.message_type()->map_value();
+    return value.message_type() == nullptr ? "number by name" : link_to(*value.message_type()) + " by name";
+  }
+  std::string text;
+  switch (field.cpp_type()) {
+    case FieldDescriptor::CPPTYPE_MESSAGE: {
+      const std::string& name = field.message_type()->full_name();
+      text = name == "google.protobuf.Value"       ? "value or null"
+             : name == "google.protobuf.ListValue" ? "list"
+             : name == "google.protobuf.Struct"    ? "object"
+                                                   : link_to(*field.message_type());
+      break;
+    }
+    case FieldDescriptor::CPPTYPE_STRING: text = "text"; break;
+    case FieldDescriptor::CPPTYPE_BOOL: text = "true, false"; break;
+    case FieldDescriptor::CPPTYPE_DOUBLE: text = "number"; break;
+    default: text = "whole number";
+  }
+  return (field.is_repeated() ? "list of " : "") + text;
+}
+
+/// The message that a key leads to; null: none of this schema.
+const pb::Descriptor* below_key(const FieldDescriptor& field) {
+  const pb::Descriptor* type =
+      field.is_map() ? field.message_type()->map_value()->message_type() : field.message_type();
+  return type != nullptr && type->file() == field.file() ? type : nullptr;
+}
+
+void add_keys(std::string& page, const pb::Descriptor& message) {
+  page += fmt::format("\n### {}\n", message.name());
+  if (const std::string comment = comment_of(message); !comment.empty()) page += "\n" + with_links(comment);
+  page += "\n| key | unit | value | meaning |\n|---|---|---|---|\n";
+  for (int f = 0; f < message.field_count(); ++f) {
+    const FieldDescriptor& field = *message.field(f);
+    page += fmt::format("| `{}` | {} | {} | {} |\n", field.name(), unit_of_key(field.name()), value_of_key(field),
+                        cell_of(field));
+  }
+}
+
 }  // namespace
 
+std::string result_keys(const std::filesystem::path& descriptors) {
+  const Schema schema{descriptors};
+  std::vector<const pb::Descriptor*> found{&schema.message("identification.Result")};
+  std::set<const pb::Descriptor*> seen{found.front()};
+  std::string page;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    add_keys(page, *found[i]);
+    for (int f = 0; f < found[i]->field_count(); ++f)
+      if (const pb::Descriptor* below = below_key(*found[i]->field(f));
+          below != nullptr && seen.insert(below).second)
+        found.push_back(below);
+  }
+  return page + "\n";
+}
+
 std::string experiment_schema(const std::filesystem::path& descriptors) {
-  return sections(Schema{descriptors}, "Experiment");
+  return sections(Schema{descriptors}, "proto.Experiment");
 }
 std::string model_schema(const std::filesystem::path& descriptors) {
-  return sections(Schema{descriptors}, "Model");
+  return sections(Schema{descriptors}, "proto.Model");
 }
 
 }  // namespace kilotwin::reference

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "clients/identify/fit/fitter.hpp"
+#include "clients/identify/fit/profile.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -112,6 +113,23 @@ double Fitter::fit_command_lag(FitState& state, double least_gain) const {
   if (gain < least_gain) return 0;
   state = std::move(best);
   return gain;
+}
+
+std::pair<double, double> Fitter::command_lag_interval(const FitState& state) const {
+  constexpr double kFirst_s = 0.01, kFarthest_s = 0.5;
+  // Base parameters, biases and coefficients follow the lag by one step each.
+  const auto value = [&](double lag_s) {
+    FitState trial = state;
+    trial.model.base.command_lag_s = lag_s;
+    trial.tracks.set_command_lag(lag_s);
+    step(trial);
+    return log_likelihood_of_all(trial);
+  };
+  const double at_s = state.model.base.command_lag_s, most = value(at_s);
+  const auto distance_s = [&](double sign) {
+    return profile_distance([&](double far_s) { return most - value(at_s + sign * far_s); }, kFirst_s, kFarthest_s);
+  };
+  return {at_s - distance_s(-1), at_s + distance_s(1)};
 }
 
 }  // namespace kilotwin::identify

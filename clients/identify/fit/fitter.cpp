@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "clients/identify/fit/noise_fit.hpp"
-
 namespace kilotwin::identify {
 
 std::vector<Block> blocks_of(const MotionModel& model) {
@@ -14,6 +12,10 @@ std::vector<Block> blocks_of(const MotionModel& model) {
 
 void Fitter::fit_noise(FitState& state) const {
   state.model.noise = most_likely_noise(state.model, state.tracks.some_tracks(kEnoughSamples), headings_, threads_);
+}
+
+NoiseInterval Fitter::noise_interval(const FitState& state) const {
+  return identify::noise_interval(state.model, state.tracks.some_tracks(kEnoughSamples), headings_, threads_);
 }
 
 void Fitter::fit_base(FitState& state) const {

@@ -6,10 +6,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <utility>
 #include <vector>
 
 #include "clients/identify/fit/fit_state.hpp"
 #include "clients/identify/fit/linearisation.hpp"
+#include "clients/identify/fit/noise_fit.hpp"
 
 namespace kilotwin::identify {
 
@@ -57,6 +59,14 @@ class Fitter {
   void add_base_prior(const MotionModel&, Eigen::MatrixXd& information, Eigen::VectorXd& score) const;
   /// Moves base parameters, coefficients and biases by a step in all columns.
   static void apply(MotionModel&, const std::vector<Unit>&, const Eigen::VectorXd& step);
+
+  /// 95 % intervals of the fitted noise by profile likelihood, on the tracks by which fit_noise() fits it.
+  [[nodiscard]] NoiseInterval noise_interval(const FitState&) const;
+  /// 95 % interval of the fitted lag of the commands by profile likelihood: low, high.
+  [[nodiscard]] std::pair<double, double> command_lag_interval(const FitState&) const;
+
+  /// The mean of the biases has a prior: as if so many biases with the value of the ARGoS paper had been measured.
+  static constexpr double kPriorBiases = 4;
 
   [[nodiscard]] std::uint32_t threads() const { return threads_; }
 

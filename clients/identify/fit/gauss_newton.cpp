@@ -101,11 +101,10 @@ void Fitter::apply(MotionModel& model, const std::vector<Unit>& units, const Eig
   }
   // Population distribution of biases, with a prior at the ARGoS paper's values for few robots.
   const BaseParameters defaults;
-  constexpr double kSeedRobots = 4;
-  const double mean = sum / (count + kSeedRobots);
+  const double mean = sum / (count + kPriorBiases);
   const double variance = (square - 2 * mean * sum + count * mean * mean +
-                           kSeedRobots * defaults.bias_sd_mm_s * defaults.bias_sd_mm_s) /
-                          (count + kSeedRobots);
+                           kPriorBiases * defaults.bias_sd_mm_s * defaults.bias_sd_mm_s) /
+                          (count + kPriorBiases);
   model.base.bias_mean_mm_s = mean;
   model.base.bias_sd_mm_s = std::sqrt(std::max(variance, 0.01));
 }

@@ -1,5 +1,6 @@
 #include "clients/identify/fit/noise_fit.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
@@ -8,6 +9,7 @@
 #include <utility>
 
 #include "clients/identify/fit/linearisation.hpp"
+#include "clients/identify/fit/profile.hpp"
 #include "core/os/worker_pool.hpp"
 
 namespace kilotwin::identify {
@@ -225,6 +227,35 @@ class Climb {
     return value;
   }
 
+  [[nodiscard]] double value(const NoiseVector& at) const { return values({at}).front(); }
+
+  /// Negative second derivatives at the maximum.
+  [[nodiscard]] Eigen::MatrixXd curvature(const NoiseVector& at) const {
+    constexpr double kStep = 0.15;
+    const Eigen::Index count = size();
+    std::vector<NoiseVector> trials{at};
+    const auto add = [&](Eigen::Index i, double by, Eigen::Index j, double and_by) {
+      trials.push_back(at);
+      trials.back()[i] += by;
+      trials.back()[j] += and_by;
+    };
+    for (Eigen::Index i = 0; i < count; ++i)
+      for (Eigen::Index j = 0; j <= i; ++j)
+        for (const double by : {kStep, -kStep})
+          for (const double and_by : {kStep, -kStep}) add(i, by, j, and_by);
+    const std::vector<double> found = values(trials);
+    Eigen::MatrixXd out(count, count);
+    auto next = found.begin() + 1;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      for (Eigen::Index j = 0; j <= i; ++j, next += 4)
+        out(i, j) = out(j, i) = -(next[0] - next[1] - next[2] + next[3]) / (4 * kStep * kStep);
+    }
+    return out;
+  }
+
+  /// Number of variances that these data have.
+  [[nodiscard]] Eigen::Index size() const { return has_headings_ ? kNoises : kMeasuredHeading; }
+
  private:
   [[nodiscard]] std::vector<double> values(const std::vector<NoiseVector>& at) const {
     std::vector<NoiseVector> variance;
@@ -242,7 +273,7 @@ class Climb {
   }
   [[nodiscard]] NoiseVector gradient_at(const NoiseVector& at) const {
     constexpr double kStep = 0.02;
-    const Eigen::Index count = has_headings_ ? kNoises : kMeasuredHeading;
+    const Eigen::Index count = size();
     std::vector<NoiseVector> trials;
     for (Eigen::Index i = 0; i < count; ++i) {
       for (const double by : {kStep, -kStep}) {
@@ -265,7 +296,56 @@ class Climb {
   std::size_t samples_ = 0;
 };
 
+std::vector<Path> paths_of(const MotionModel& model, const std::vector<const TrackView*>& tracks,
+                           std::uint32_t threads) {
+  std::vector<Path> paths(tracks.size());
+  os::in_parallel(tracks.size(), threads, [&](std::size_t i) { paths[i] = path_of(model, *tracks[i]); });
+  return paths;
+}
+
+/// By which the other log variances follow one of them along the ridge of the likelihood.
+NoiseVector along_ridge(const Eigen::MatrixXd& curvature, Eigen::Index i) {
+  constexpr double kRidge = 0.05, kMost = 3;
+  Eigen::MatrixXd others = curvature;
+  others.diagonal().array() += kRidge;
+  others.row(i).setZero();
+  others.col(i).setZero();
+  others(i, i) = 1;
+  Eigen::VectorXd cross = curvature.col(i);
+  cross[i] = 0;
+  NoiseVector by = NoiseVector::Zero();
+  by.head(curvature.rows()) = -others.ldlt().solve(cross).cwiseMax(-kMost).cwiseMin(kMost);
+  by[i] = 1;
+  return by;
+}
+
 }  // namespace
+
+NoiseInterval noise_interval(const MotionModel& model, const std::vector<const TrackView*>& tracks,
+                             bool has_headings, std::uint32_t threads) {
+  const std::vector<Path> paths = paths_of(model, tracks, threads);
+  const Climb climb(paths, has_headings, threads);
+  NoiseVector best = logs_of(model.noise);
+  const double value = climb(best);
+  const Eigen::MatrixXd curvature = climb.curvature(best);
+  NoiseVector low = NoiseVector::Constant(NAN), high = low;
+  for (Eigen::Index i = 0; i < climb.size(); ++i) {
+    // By factors of e: beyond, the variance hides everything or has no influence.
+    constexpr double kFirst = 0.1, kFarthest = 9;
+    const NoiseVector ridge = along_ridge(curvature, i);
+    const auto end = [&](double sign) {
+      return std::exp(
+          best[i] +
+          sign * profile_distance([&](double far) { return value - climb.value(best + sign * far * ridge); },
+                                  kFirst, kFarthest));
+    };
+    low[i] = end(-1);
+    high[i] = end(1);
+  }
+  Noise unknown;
+  unknown.wall_mm2_s = unknown.wall_rad2_s = unknown.contact_mm2_s = unknown.contact_rad2_s = NAN;
+  return {with(unknown, low), with(unknown, high)};
+}
 
 Noise most_likely_noise(const MotionModel& start, const std::vector<const TrackView*>& tracks, bool has_headings,
                         std::uint32_t threads) {
@@ -273,8 +353,7 @@ Noise most_likely_noise(const MotionModel& start, const std::vector<const TrackV
   constexpr int kMostRounds = 4;
   constexpr double kSettled = 0.1;  // in the logarithm; the paths are then consistent with the variances
   for (int round = 0; round < kMostRounds; ++round) {
-    std::vector<Path> paths(tracks.size());
-    os::in_parallel(tracks.size(), threads, [&](std::size_t i) { paths[i] = path_of(model, *tracks[i]); });
+    const std::vector<Path> paths = paths_of(model, tracks, threads);
     const Climb climb(paths, has_headings, threads);
     const NoiseVector before = logs_of(model.noise);
     NoiseVector at = before;

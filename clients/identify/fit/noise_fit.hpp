@@ -13,4 +13,13 @@ namespace kilotwin::identify {
 [[nodiscard]] Noise most_likely_noise(const MotionModel&, const std::vector<const TrackView*>& tracks,
                                       bool has_headings, std::uint32_t threads);
 
+/// Ends of intervals; NaN where nothing was estimated: contact noise, and measured headings of sets without.
+struct NoiseInterval {
+  Noise low, high;
+};
+
+/// 95 % intervals by profile likelihood about the fitted noise. A variance that may as well be 0 has the end 0.
+[[nodiscard]] NoiseInterval noise_interval(const MotionModel&, const std::vector<const TrackView*>& tracks,
+                                           bool has_headings, std::uint32_t threads);
+
 }  // namespace kilotwin::identify

@@ -25,6 +25,25 @@ double dispersion_of(const std::vector<Unit>& units, const Eigen::MatrixXd& cova
   return clusters < kFewest || expected <= 0 ? 1 : std::max(1.0, sum / expected);
 }
 
+/// Adds the mean of the biases over robots as a last parameter. The biases have it as the mean of their prior, and it has been
+/// eliminated from no unit: base speeds and this mean explain the same motion.
+Eigen::MatrixXd with_bias_mean(const std::vector<Unit>& units, const Eigen::MatrixXd& information,
+                               double bias_sd_mm_s) {
+  const Eigen::Index n = information.rows();
+  const double precision = 1 / (bias_sd_mm_s * bias_sd_mm_s);
+  const Eigen::Vector2d ones = Eigen::Vector2d::Ones();
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(n + 1, n + 1);
+  out.topLeftCorner(n, n) = information;
+  // Its own prior: as many biases at the ARGoS paper's value as the fit assumes.
+  out(n, n) = Fitter::kPriorBiases * precision;
+  for (const Unit& unit : units) {
+    out.col(n).head(n) += precision * unit.bias_by_column.transpose() * ones;
+    out(n, n) += 2 * precision - precision * precision * ones.dot(unit.bias_covariance * ones);
+  }
+  out.row(n).head(n) = out.col(n).head(n).transpose();
+  return out;
+}
+
 }  // namespace
 
 Uncertainty uncertainty_of(const Fitter& fitter, const FitState& state) {
@@ -44,13 +63,20 @@ Uncertainty uncertainty_of(const Fitter& fitter, const FitState& state) {
   if (const Eigen::VectorXd by_scale = log_scale_by_coefficients(model); by_scale.size() > 0 && state.scale)
     information.bottomRightCorner(by_scale.size(), by_scale.size()).noalias() +=
         by_scale * by_scale.transpose() / (state.scale->relative_sd() * state.scale->relative_sd());
+  const double bias_precision = 1 / (model.base.bias_sd_mm_s * model.base.bias_sd_mm_s);
+  const Eigen::MatrixXd with_mean = with_bias_mean(units, information, model.base.bias_sd_mm_s);
+  Eigen::MatrixXd covariance = with_mean.ldlt().solve(Eigen::MatrixXd::Identity(n + 1, n + 1));
   Uncertainty out;
-  out.covariance = information.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
-  out.covariance *= dispersion_of(units, out.covariance);
+  covariance *= dispersion_of(units, covariance.topLeftCorner(n, n));
+  out.covariance = covariance.topLeftCorner(n, n);
+  // The mean of the biases where the columns are known: it follows them, and has a variance of its own.
+  const Eigen::RowVectorXd mean_by_column = -with_mean.row(n).head(n) / with_mean(n, n);
+  const double mean_variance = 1 / with_mean(n, n);
   // A robot with several units has the precision-weighted mean of their biases.
   struct Sums {
     Eigen::Matrix2d precision = Eigen::Matrix2d::Zero();
     Eigen::MatrixXd by_column;
+    double units = 0;
   };
   std::map<std::uint32_t, Sums> robots;
   for (const Unit& unit : units) {
@@ -59,12 +85,15 @@ Uncertainty uncertainty_of(const Fitter& fitter, const FitState& state) {
     if (sums.by_column.size() == 0) sums.by_column = Eigen::MatrixXd::Zero(2, n);
     sums.precision += precision;
     sums.by_column += precision * unit.bias_by_column;
+    sums.units += 1;
   }
   for (const auto& [robot, sums] : robots) {
-    const Eigen::Matrix2d own = sums.precision.inverse();
-    const Eigen::MatrixXd by = own * sums.by_column;
+    const Eigen::Matrix2d alone = sums.precision.inverse();
+    const Eigen::Vector2d by_mean = alone * Eigen::Vector2d::Constant(sums.units * bias_precision);
+    const Eigen::Matrix2d own = alone + by_mean * mean_variance * by_mean.transpose();
+    const Eigen::MatrixXd by = by_mean * mean_by_column - alone * sums.by_column;
     out.biases[robot] = own + by * out.covariance * by.transpose();
-    out.given[robot] = {own, -by};
+    out.given[robot] = {own, by};
   }
   return out;
 }

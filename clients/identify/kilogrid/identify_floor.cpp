@@ -102,6 +102,15 @@ void add_words(identification::Identification& found) {
       fmt::format("area under the ROC curve, simulated against measured held-out runs: {:.3f} before, {:.3f} after "
                   "({:.3f} to {:.3f}); measured days against each other {:.3f}",
                   before.area(), after.area(), after.low(), after.high(), days.area()));
+  const identification::Result& result = found.result();
+  for (const std::string& name : result.check().dropped())
+    found.add_summary(
+        fmt::format("{}: not written, because days that took no part are predicted no better with it", name));
+  for (const std::string& words : {result.held_out().in_words(), result.check().in_words()}) {
+    if (words.empty()) continue;
+    found.add_summary(words);
+    found.set_verdict(found.verdict() + " " + words);
+  }
   identification::Table& table = *found.add_tables();
   table.set_id("features");
   table.set_title("Differences between simulated and measured robots");
@@ -265,7 +274,9 @@ FloorScore FloorIdentification::score_of(const FloorModel& model) const {
 void FloorIdentification::choose() {
   part_ = 0.82;
   say("last check");
-  if (effects_of(model_) > 0) path_.push_back({names_of(model_), model_});
+  // Without elimination and without walls it is the last model already.
+  if (model_.values != path_.back().model.values || names_of(model_) != path_.back().effects)
+    path_.push_back({names_of(model_), model_});
   std::vector<FloorScore> scores;
   for (const FloorStage& stage : path_) {
     scores.push_back(score_of(stage.model));

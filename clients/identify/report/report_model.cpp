@@ -77,6 +77,7 @@ Section model_section(const Identification& found) {
   set_text(section, "disc_centre", result.disc_centre().in_words());
   if (const identification::CommandLag& lag = result.command_lag(); lag.has_low_s() && lag.has_high_s())
     section.set("lag", fmt::format("{:.3f} s ({:.3f} to {:.3f} s, 95 %)", lag.lag_s(), lag.low_s(), lag.high_s()));
+  if (result.has_base_sd() || result.has_noise_low()) section.set("intervals", Data{Data::type::bool_true});
   section.set("tables", tables);
   return section;
 }

@@ -34,6 +34,30 @@ Vec through_fisheye(Vec point, double strength) {
 
 }  // namespace
 
+Effect noisy_robots() {
+  return {"noisy-robots",
+          "the speeds of every third robot vary with 2.5 times the standard deviation of the others",
+          {{"robot"}},
+          {},
+          {},
+          {},
+          [](const Situation& at) { return at.robot % 3 == 0 ? 2.5 : 1.0; }};
+}
+
+Effect rough_patch() {
+  return {
+      "rough-patch",
+      "speeds vary with 1 + 2.5 exp(-(d / 200 mm)^2) of the standard deviation, d = distance from (180, -120) mm",
+      {{"position"}},
+      {},
+      {},
+      {},
+      [](const Situation& at) {
+        const double d = std::hypot(at.disc.x - 180, at.disc.y + 120) / 200;
+        return 1 + 2.5 * std::exp(-d * d);
+      }};
+}
+
 Effect battery_by_the_clock(double strength) {
   return {"battery-by-the-clock",
           "both wheels run at 1 - 0.40 q / (1 + q) of their speed, q = (t / 85 s)^3",

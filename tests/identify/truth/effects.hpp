@@ -6,6 +6,8 @@
 namespace kilotwin::truth {
 
 // Time and motor-on time.
+Effect noisy_robots();                               // every third robot's wheels vary more
+Effect rough_patch();                                // wheels vary more on a part of the floor
 Effect battery_by_the_clock(double strength = 1);    // all wheels slow down with run time
 Effect fatigue_of_motors(double strength = 1);       // each wheel slows down with its motor-on time
 Effect fatigue_of_left_motors(double strength = 1);  // the same for left wheels only

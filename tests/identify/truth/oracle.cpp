@@ -39,7 +39,7 @@ class Belief {
   Stance best() const { return stance_of(guesses_.front().mean); }
 
   void go_on(const Situation& now, double dt) {
-    const double sd = scene_.factor_sd * std::sqrt(scene_.step_s / dt);
+    const double sd = factor_sd(scene_, now, dt);
     for (Guess& guess : guesses_) {
       const auto step = [&](const Vector3d& from, Wheels<double> factor) {
         return vector_of(moved(scene_, individual_, stance_of(from), now, dt, factor));

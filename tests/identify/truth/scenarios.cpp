@@ -77,6 +77,10 @@ using Faults = std::vector<Fault>;
 
 const Entry kEntries[] = {
     // One per covariate, and look-alikes.
+    {"noisy-robots", "noise: the speeds of some robots vary more",
+     [] { return with(tidy_lab(), Effects{noisy_robots()}); }},
+    {"rough-patch", "noise: speeds vary more on a part of the floor",
+     [] { return with(tidy_lab(), Effects{rough_patch()}); }},
     {"battery", "time: a battery by the clock", [] { return with(tidy_lab(), Effects{battery_by_the_clock()}); }},
     {"fatigue", "motor_time: each motor tires by its own use",
      [] { return with(blind_lab(), Effects{fatigue_of_motors()}); }},

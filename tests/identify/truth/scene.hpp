@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -70,6 +71,8 @@ struct Effect {
   Covariates mistaken_for;
   std::function<void(const Situation&, Push&)> push;  // either may be empty
   std::function<void(const Situation&, View&)> see;
+  /// Factor of the standard deviation of f; may be empty.
+  std::function<double(const Situation&)> noise = {};
 };
 
 /// A fault of the data.
@@ -127,6 +130,14 @@ struct Scene {
   std::vector<Effect> effects;
   std::vector<Fault> faults;  // in training runs
 };
+
+/// Standard deviation of f in a step of `dt`.
+inline double factor_sd(const Scene& scene, const Situation& at, double dt) {
+  double sd = scene.factor_sd * std::sqrt(scene.step_s / dt);
+  for (const Effect& effect : scene.effects)
+    if (effect.noise) sd *= effect.noise(at);
+  return sd;
+}
 
 /// Individual parameters of robots, fixed per scene and seed.
 struct Individual {

@@ -217,11 +217,13 @@ void World::start_from(double time_s, const Memory& memory, const std::vector<St
 
 void World::step(double dt, Dice* dice) {
   // f is drawn per step; shorter steps have a larger variance, so that its integral does not depend on the cuts.
-  const double sd = scene_.factor_sd * std::sqrt(scene_.step_s / dt);
   for (std::size_t i = 0; i < stances_.size(); ++i) {
-    Wheels<double> factor{1, 1};
-    if (dice) factor = {1 + sd * dice->normal(), 1 + sd * dice->normal()};
     const Situation now = memory_.situation(static_cast<int>(i), discs_[i], stances_[i].heading_rad, discs_);
+    Wheels<double> factor{1, 1};
+    if (dice) {
+      const double sd = factor_sd(scene_, now, dt);
+      factor = {1 + sd * dice->normal(), 1 + sd * dice->normal()};
+    }
     stances_[i] = moved(scene_, individuals_[i], stances_[i], now, dt, factor);
   }
   part(scene_, stances_, shift_);

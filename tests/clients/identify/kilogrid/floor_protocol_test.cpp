@@ -122,6 +122,7 @@ TEST(IdentifyFloor, SaysWhichDaysChoseAndThatDaysWereOpenedBefore) {
   EXPECT_EQ(result.held_out().opened_before(), 1U);
   EXPECT_NE(result.check().in_words().find("1 other search was reported on them before"), std::string::npos)
       << result.check().in_words();
+  EXPECT_NE(found.found.verdict().find(result.check().in_words()), std::string::npos) << "the page says it";
   EXPECT_EQ(result.check().path_size(), 1);
   EXPECT_EQ(result.before().misfit() > 0, true);
 }

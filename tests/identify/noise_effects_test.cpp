@@ -1,0 +1,198 @@
+// Effects on the size of the motion noise: found where they are, named, written, and not found where they are not. Intervals of
+// the noise, of the lag, of curves and maps.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "clients/identify/bands.hpp"
+#include "clients/identify/model/effect_records.hpp"
+#include "clients/identify/model/effect_text.hpp"
+#include "clients/identify/model/model_file.hpp"
+#include "clients/identify/noise_effects.hpp"
+#include "clients/identify/search/hypotheses.hpp"
+#include "tests/identify/small_set.hpp"
+#include "tests/identify/truth/effects.hpp"
+
+namespace kilotwin {
+namespace {
+
+using namespace identify;
+
+/// A base model fitted to a scene, and its samples of the noise.
+struct Fitted {
+  explicit Fitted(const truth::Scene& scene)
+      : set(set_of(scene, played(scene))), fitter(set, 2), state(set), samples(samples_of()) {}
+
+  MeasuredSet set;
+  Fitter fitter;
+  FitState state;
+  std::vector<NoiseSample> samples;
+
+ private:
+  std::vector<NoiseSample> samples_of() {
+    fitter.fit_base(state);
+    return noise_samples_of(state, 2);
+  }
+};
+
+const proto::Effect* record(const proto::Model& model, const std::string& name) {
+  const auto at = std::find_if(model.effect().begin(), model.effect().end(),
+                               [&](const proto::Effect& effect) { return effect.name() == name; });
+  return at == model.effect().end() ? nullptr : &*at;
+}
+
+TEST(NoiseEffects, NoisyRobotsAreFoundNamedAndWritten) {
+  const Fitted f(small({truth::noisy_robots()}));
+  const std::vector<NoiseEffect> found = find_noise_effects(f.samples);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].covariates, std::vector<std::string>{"robot"});
+  EXPECT_NEAR(found[0].most / found[0].least, 2.5, 0.9);
+
+  proto::Model model = proto_of(f.state.model);
+  write_noise_effects(model, f.state.model.noise, found);
+  EXPECT_EQ(model.motion().factor_variance_s(), 0);
+  for (const char* name : {"factor-noise", "wheel-noise", "heading-noise"}) {
+    const proto::Effect* const noise = record(model, name);
+    ASSERT_NE(noise, nullptr) << name;
+    ASSERT_EQ(noise->function_size(), 2) << name;
+    EXPECT_TRUE(noise->function(0).has_noise());
+    const proto::Table& table = noise->function(1).table();
+    ASSERT_EQ(table.key_size(), 10);
+    // Every third robot has more than all others.
+    double least_noisy = INFINITY, most_quiet = 0;
+    for (int i = 0; i < table.key_size(); ++i) {
+      if (table.key(i) % 3 == 0)
+        least_noisy = std::min(least_noisy, table.value(i));
+      else
+        most_quiet = std::max(most_quiet, table.value(i));
+    }
+    EXPECT_GT(least_noisy, 1.3 * most_quiet);
+  }
+  const double sd = record(model, "factor-noise")->function(0).noise().sd();
+  EXPECT_NEAR(sd * sd, f.state.model.noise.factor_s, 1e-6);
+}
+
+TEST(NoiseEffects, ARoughPatchIsAnEffectOfPlace) {
+  truth::Scene scene = small({truth::rough_patch()});
+  scene.train_runs = 4;
+  const Fitted f(scene);
+  const std::vector<NoiseEffect> found = find_noise_effects(f.samples);
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found[0].covariates, std::vector<std::string>{"position"});
+  EXPECT_TRUE(found[0].scale.has_spline_2d());
+}
+
+TEST(NoiseEffects, EqualNoiseHasNone) {
+  for (const std::uint64_t seed : {5u, 6u}) {
+    truth::Scene scene = small({});
+    const MeasuredSet set = set_of(scene, played(scene, seed));
+    const Fitter fitter(set, 2);
+    FitState state(set);
+    fitter.fit_base(state);
+    for (const NoiseEffect& effect : find_noise_effects(noise_samples_of(state, 2)))
+      ADD_FAILURE() << effect.name << ", log10 p " << effect.log10_p << ", gain " << effect.held_out;
+  }
+}
+
+TEST(NoiseRatio, IsHigherForNoisyRobots) {
+  const Fitted f(small({truth::noisy_robots()}));
+  const auto ratios = noise_ratios_of(f.samples);
+  ASSERT_EQ(ratios.size(), 10U);
+  for (const auto& [robot, ratio] : ratios) {
+    EXPECT_LT(ratio.low, ratio.value);
+    EXPECT_GT(ratio.high, ratio.value);
+    if (robot % 3 == 0)
+      EXPECT_GT(ratio.low, 1) << robot;
+    else
+      EXPECT_LT(ratio.value, 1.1) << robot;
+  }
+}
+
+TEST(NoiseInterval, HoldsTheTruth) {
+  const truth::Scene scene = small({});
+  const Fitted f(scene);
+  const NoiseInterval interval = f.fitter.noise_interval(f.state);
+  const Noise& noise = f.state.model.noise;
+  const auto holds = [](double low, double truth, double high) { return low <= truth && truth <= high; };
+  EXPECT_TRUE(holds(interval.low.position_mm2, noise.position_mm2, interval.high.position_mm2));
+  EXPECT_TRUE(
+      holds(std::sqrt(interval.low.position_mm2), scene.tracker_sd_mm, std::sqrt(interval.high.position_mm2)));
+  EXPECT_TRUE(
+      holds(std::sqrt(interval.low.heading_rad2), scene.heading_sd_rad, std::sqrt(interval.high.heading_rad2)));
+  // Thousands of samples determine the tracker's noise, and a curvature alone gives the same width.
+  EXPECT_LT(interval.high.position_mm2, 1.3 * interval.low.position_mm2);
+  EXPECT_GT(interval.high.position_mm2, 1.02 * interval.low.position_mm2);
+  EXPECT_TRUE(std::isnan(interval.low.wall_mm2_s)) << "contact noise has no interval";
+}
+
+TEST(Uncertainty, OfTheBaseSpeedContainsThatOfTheMeanBias) {
+  const Fitted f(small({}));
+  const Uncertainty u = uncertainty_of(f.fitter, f.state);
+  // The data give the sum of speed and biases, as a common scale of speeds and wheel base. Ten robots have 20 biases with the
+  // standard deviation s about their mean, which is itself known by a prior of four biases only.
+  const double s = f.state.model.base.bias_sd_mm_s;
+  const BasePrior prior;
+  const double of_scale = 1 / std::pow(prior.straight_mm_s, 2) + 1 / std::pow(prior.turn_mm_s / 2, 2) +
+                          1 / std::pow(prior.wheel_base_mm / 2.5, 2);
+  const auto sd_of_speed = [&](double variance) { return 1 / std::sqrt(of_scale + 1 / variance); };
+  const double mean_known = sd_of_speed(s * s / 20), mean_open = sd_of_speed(s * s / 20 + s * s / 4);
+  EXPECT_GT(u.sd(kStraightSpeed), 0.5 * (mean_known + mean_open)) << mean_known << ", " << mean_open;
+  EXPECT_LT(u.sd(kStraightSpeed), 1.2 * mean_open);
+}
+
+/// A term by name and form, fitted.
+FitState with_term(const Fitted& f, const std::string& name, const std::string& form) {
+  FitState state = f.state;
+  const Dictionary all = dictionary_of(extent_of(state.tracks), {});
+  const auto h = std::find_if(all.hypotheses.rbegin(), all.hypotheses.rend(), [&](const Hypothesis& one) {
+    return one.name == name && form_of(all.term_of(one, 1)) == form;
+  });
+  EXPECT_NE(h, all.hypotheses.rend()) << name;
+  state.model.terms.push_back(all.term_of(*h, 1));
+  f.fitter.fit(state, 2);
+  return state;
+}
+
+TEST(Bands, OfACurveStandAtItsPoints) {
+  const Fitted f(small({truth::battery_by_the_clock()}));
+  const FitState state = with_term(f, "speed-by-time", "curve");
+  const Uncertainty u = uncertainty_of(f.fitter, state);
+  std::vector<identification::EffectCurve> curves =
+      curves_of("speed-by-time", effects_of_term(state.model.terms.front()));
+  ASSERT_FALSE(curves.empty());
+  identification::EffectCurve& curve = curves.front();
+  set_band(curve, state.model, 0, u);
+  ASSERT_EQ(curve.low_size(), curve.at_size());
+  for (int i = 0; i < curve.at_size(); ++i) {
+    EXPECT_LT(curve.low(i), curve.value(i));
+    EXPECT_GT(curve.high(i), curve.value(i));
+    EXPECT_LT(curve.high(i) - curve.low(i), 60) << "per cent";
+  }
+}
+
+TEST(Bands, OfAnotherTermAreNotDrawn) {
+  const Fitted f(small({truth::battery_by_the_clock()}));
+  const FitState state = with_term(f, "speed-by-time", "curve");
+  identification::EffectCurve curve =
+      curves_of("speed-by-time", effects_of_term(state.model.terms.front())).front();
+  for (double& value : *curve.mutable_value()) value += 10;
+  set_band(curve, state.model, 0, uncertainty_of(f.fitter, state));
+  EXPECT_EQ(curve.low_size(), 0) << "the values are not those of the term";
+}
+
+TEST(Bands, OfAMapStandInItsCells) {
+  const Fitted f(small({truth::rough_patch()}));
+  const FitState state = with_term(f, "speed-by-position", "map");
+  std::vector<identification::EffectMap> maps =
+      maps_of("speed-by-position", effects_of_term(state.model.terms.front()));
+  ASSERT_FALSE(maps.empty());
+  set_band(maps.front(), state.model, 0, uncertainty_of(f.fitter, state));
+  ASSERT_EQ(maps.front().low_size(), maps.front().y_mm_size());
+  const auto value = [&](const auto& rows) { return rows[3].values(5).number_value(); };
+  EXPECT_LT(value(maps.front().low()), value(maps.front().effect()));
+  EXPECT_GT(value(maps.front().high()), value(maps.front().effect()));
+}
+
+}  // namespace
+}  // namespace kilotwin
