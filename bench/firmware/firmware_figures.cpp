@@ -1,8 +1,9 @@
 // Figures of firmware robots:
 //   firmware_figures agreement    six programs, native and as firmware, 120 s: agreement of motors and LED within a tick
 //   firmware_figures contention   25 robots in range of each other: messages per robot, native and firmware
-//   firmware_figures speed        simulated time per wall time, over numbers of robots and threads
+//   firmware_figures speed        10 robots on two threads: robot-seconds per second of CPU time, and simulated per wall time
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
@@ -107,18 +108,30 @@ int show_contention() {
   return status;
 }
 
+/// CPU time of this process and of its threads, without the compilers that it starts.
+double cpu_s() {
+  rusage used{};
+  getrusage(RUSAGE_SELF, &used);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(used.ru_utime) + seconds(used.ru_stime);
+}
+
 int show_speed() {
-  fmt::print("{:>8}{:>10}{:>14}\n", "robots", "threads", "x real time");
-  for (const std::uint32_t robots : {1u, 2u, 4u, 8u, 16u}) {
-    for (const std::uint32_t threads : {1u, 2u}) {
-      double best = 0;
-      for (int repeat = 0; repeat < 3; ++repeat) {
-        const Timeline timeline = run_timeline(
-            experiment(kSource + "/behaviours/disperse.c", true, robots, 10, 40, 0.005), folder(), threads);
-        best = std::max(best, 10 / timeline.totals.wall_s);
-      }
-      fmt::print("{:>8}{:>10}{:>14.2f}\n", robots, threads, best);
-    }
+  constexpr std::uint32_t kRobots = 10;
+  constexpr double kDuration_s = 20;
+  fmt::print("{:<46}{:>26}{:>14}\n", "program", "robot-s per s of CPU time", "x real time");
+  for (const char* const program :
+       {"bench/firmware/still.c", "behaviours/delay_walk.c", "behaviours/blink.c", "behaviours/disperse.c",
+        "behaviours/phototaxis.c", "behaviours/move_to_light.c", "tests/validation/programs/set/counts_loops.c",
+        "tests/validation/programs/set/computes_long.c"}) {
+    const std::string text = experiment(kSource + "/" + program, true, kRobots, kDuration_s, 40, 0.005) +
+                             "light { source { height_mm: 60 intensity: 1500 } }\n";
+    const double begun_s = cpu_s();
+    const Timeline timeline = run_timeline(text, folder(), 2);
+    fmt::print("{:<46}{:>26.0f}{:>14.1f}\n", program, kRobots * kDuration_s / (cpu_s() - begun_s),
+               kDuration_s / timeline.totals.wall_s);
   }
   return 0;
 }

@@ -90,7 +90,8 @@ Command add_build(CLI::App& program) {
   app.add_option("--define", arguments->define, "a macro")->allow_extra_args(false)->type_name("NAME=VALUE");
   app.add_option(
          "--kilolib", arguments->kilolib,
-         "the library that the program is written for, kilobot or kilogrid (default: what its sources show)")
+         "the library that the program is written for, kilobot or kilogrid (default: what its sources and headers "
+         "show)")
       ->type_name("NAME");
   app.add_flag(
       "--avr", arguments->avr,

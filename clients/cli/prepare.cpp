@@ -101,6 +101,7 @@ std::vector<fs::path> build_programs(const LoadedExperiment& loaded, const RunAr
       throw UserError(fmt::format("{}: a shadow runs natively; give C source", sources.front().string()));
     behaviours::CompileOptions options;
     options.defines = arguments.define;
+    options.kilolib = arguments.kilolib;
     options.boot_loader = true;
     options.wide_int = group.wide_int();
     const behaviours::CompiledProgram compiled = is_linked     ? checked_firmware(sources.front())

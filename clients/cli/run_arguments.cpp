@@ -36,6 +36,11 @@ void add_experiment_options(CLI::App& app, RunArguments& arguments) {
   app.add_option("--define", arguments.define, "a macro for the programs that are compiled")
       ->allow_extra_args(false)
       ->type_name("NAME=VALUE");
+  app.add_option(
+         "--kilolib", arguments.kilolib,
+         "the library that the programs are written for, kilobot or kilogrid (default: what their sources and "
+         "headers show)")
+      ->type_name("NAME");
   app.add_option("--model", arguments.model, "model file (*.txtpb) in place of the experiment's model")
       ->type_name("FILE");
 }

@@ -28,6 +28,7 @@ struct RunArguments {
   std::filesystem::path behaviour;  ///< empty: as in the experiment
   std::vector<std::string> set;     ///< FIELD=VALUE
   std::vector<std::string> define;  ///< NAME=VALUE
+  std::string kilolib;              ///< behaviours::CompileOptions::kilolib
   std::filesystem::path model;
   std::string pace = "max";
   double max_lateness_ms = 0;  ///< of a tick behind the pace before the run ends; 0: any

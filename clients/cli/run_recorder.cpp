@@ -56,6 +56,9 @@ RunRecorder::RunRecorder(const RunPlan& plan, const recorder::RunDirectory& dire
       on_idle_(std::move(on_idle)),
       state_(plan),
       changes_(plan) {
+  for (std::uint32_t robot = 0; robot < plan.robots(); ++robot) {
+    if (plan.cell_side_mm(robot) > 0) displacement_.leave_out(robot);
+  }
   if (const auto earlier = earlier_recording(directory); !earlier.empty())
     take_over(earlier, resumed ? resumed->tick : Tick{0});
 }
@@ -201,7 +204,8 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   summary.partition_columns = plan_.grid.columns();
   summary.partition_rows = plan_.grid.rows();
   summary.hosts = plan_.hosts;
-  summary.robots = plan_.robots();
+  for (std::uint32_t robot = 0; robot < plan_.robots(); ++robot)
+    ++(plan_.cell_side_mm(robot) > 0 ? summary.cells : summary.robots);
   summary.ticks = std::max<std::int64_t>(0, totals.last.count());
   summary.resumed_from_tick = header_.first_tick();
   summary.recovered_from_tick = recovered_from_.count();
@@ -213,7 +217,9 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   summary.state_hash = totals.state_hash;
   summary.failure = totals.failure;
   summary.messages = {totals.attempted, totals.sent, totals.received, totals.collided};
-  for (const RadioCount& radio : totals.radios) summary.per_robot.add(radio);
+  for (std::uint32_t robot = 0; robot < totals.radios.size(); ++robot) {
+    if (!(plan_.cell_side_mm(robot) > 0)) summary.per_robot.add(totals.radios[robot]);
+  }
   summary.robots_failed = totals.robots_failed;
   std::stable_sort(failures_.begin(), failures_.end(),
                    [](const auto& a, const auto& b) { return a.time_s < b.time_s; });

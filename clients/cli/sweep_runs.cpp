@@ -59,6 +59,7 @@ std::vector<std::string> run_words(const RunArguments& arguments, const SweepPoi
       words.insert(words.end(), {"--set", set});
   }
   for (const std::string& define : arguments.define) words.insert(words.end(), {"--define", define});
+  if (!arguments.kilolib.empty()) words.insert(words.end(), {"--kilolib", arguments.kilolib});
   if (arguments.duration_s) words.insert(words.end(), {"--duration", fmt::format("{}", *arguments.duration_s)});
   if (arguments.robots) words.insert(words.end(), {"--robots", std::to_string(*arguments.robots)});
   if (!arguments.behaviour.empty()) words.insert(words.end(), {"--behaviour", arguments.behaviour.string()});

@@ -45,6 +45,7 @@ FrameArtist::FrameArtist(const recorder::RunOverview& run, Look look)
       view_(view_of(ground_, look_)),
       name_(recorder::title_of(run)),
       facts_(recorder::facts_of(run, ground_.world())),
+      cell_mm_(run.cell_mm),
       first_s_(run.paths.first().time_s),
       last_s_(run.paths.last().time_s) {}
 
@@ -52,6 +53,7 @@ std::string FrameArtist::draw_trails(const std::deque<Positions>& trails, const 
   if (trails.empty()) return {};
   std::string lines;
   for (std::size_t i = 0; i < at.x_mm.size(); ++i) {
+    if (!cell_mm_.empty() && cell_mm_[i] > 0) continue;
     long x = view_.x(trails.front().points[i].x_mm), y = view_.y(trails.front().points[i].y_mm);
     put(lines, "M{} {}", x, y);
     const auto to = [&](double x_mm, double y_mm) {
@@ -96,8 +98,8 @@ std::string FrameArtist::svg(const recorder::Snapshot& at, const recorder::Floor
       recorder::kUnitsPerPx * height_px);
   body += "<rect width=\"100%\" height=\"100%\" fill=\"#eef1f4\"/>\n";
   body += ground_.draw_floor(view_, floors) + ground_.draw_obstacles(view_) + ground_.draw_movables(view_, at);
-  body +=
-      draw_trails(trails, at) + recorder::draw_discs(at, view_) + ground_.draw_lamps(view_, at.time_s) + "</svg>\n";
+  body += draw_trails(trails, at) + recorder::draw_robots(at, cell_mm_, view_) +
+          ground_.draw_lamps(view_, at.time_s) + "</svg>\n";
   const double baseline_px = look_.height_px - 26;
   body += recorder::scale_bar(view_, kMargin_px + 1, baseline_px - 4);
   if (!look_.caption.empty())

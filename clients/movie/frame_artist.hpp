@@ -54,6 +54,7 @@ class FrameArtist {
   recorder::Ground ground_;
   recorder::View view_;
   std::string name_, facts_;
+  std::vector<double> cell_mm_;  ///< as in RunOverview
   double first_s_, last_s_;
 };
 

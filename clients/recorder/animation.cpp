@@ -106,9 +106,33 @@ std::string robot_symbol(const View& view) {
       (disc - rim) / 2, rim, disc / 2, svg::kInk, std::clamp(disc * 0.1, 1.5, 24.0));
 }
 
-std::string draw_robots(const std::vector<Snapshot>& film, const View& view, const Player& player) {
-  std::string out = robot_symbol(view);
+/// The square of a cell of a Kilogrid, in the colour of its LED.
+std::string draw_cell(const std::vector<Snapshot>& film, std::size_t cell, double side_mm, const View& view,
+                      const Player& player) {
+  std::vector<std::string> fills, opacities;
+  for (const Snapshot& at : film) {
+    const std::uint8_t led = at.led[cell] & 63;
+    fills.push_back(svg::led_colour(led));
+    opacities.emplace_back(led == 0 ? "0.15" : "0.5");
+  }
+  const double side = view.length(kCellPart * side_mm);
+  return fmt::format(
+      "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"{}\" "
+      "fill-opacity=\"{}\">{}{}</rect>\n",
+      static_cast<double>(view.x(film[0].x_mm[cell])) - side / 2,
+      static_cast<double>(view.y(film[0].y_mm[cell])) - side / 2, side, side, fills[0], opacities[0],
+      player.changing("fill", fills), player.changing("fill-opacity", opacities));
+}
+
+std::string animate_robots(const RunOverview& run, const View& view, const Player& player) {
+  const std::vector<Snapshot>& film = run.film.frames();
+  std::string out;
+  for (std::size_t i = 0; i < run.cell_mm.size(); ++i) {
+    if (run.cell_mm[i] > 0) out += draw_cell(film, i, run.cell_mm[i], view, player);
+  }
+  out += robot_symbol(view);
   for (std::size_t i = 0; i < film[0].x_mm.size(); ++i) {
+    if (!run.cell_mm.empty() && run.cell_mm[i] > 0) continue;
     std::vector<Frame> frames;
     std::vector<std::string> fills, rims;
     for (const Snapshot& at : film) {
@@ -172,7 +196,7 @@ std::string animation_svg(const RunOverview& run) {
       kMargin_px, top, kWidth_px, height_px, kUnitsPerPx * kWidth_px, kUnitsPerPx * height_px);
   body += "<rect width=\"100%\" height=\"100%\" fill=\"#eef1f4\"/>\n";
   body += ground.draw_floor(view, run.first_floors) + ground.draw_obstacles(view);
-  body += draw_movables(film, ground, view, player) + draw_robots(film, view, player);
+  body += draw_movables(film, ground, view, player) + animate_robots(run, view, player);
   body += ground.draw_lamps(view, film.front().time_s) + "</svg>\n";
   put(body, "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{:.1f}\" fill=\"none\" stroke=\"{}\"/>\n", kMargin_px,
       top, kWidth_px, height_px, svg::kLine);

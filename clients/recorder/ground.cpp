@@ -140,8 +140,10 @@ std::string title_of(const RunOverview& run) {
 
 std::string facts_of(const RunOverview& run, const World& world) {
   const proto::RecordingHeader& header = run.header;
-  return fmt::format("{} robot{} \u00b7 seed {} \u00b7 {} simulated \u00b7 arena {}", header.robots(),
-                     header.robots() == 1 ? "" : "s", header.seed(), time_text(run.paths.last().time_s),
+  const std::uint32_t cells = run.cells(), robots = header.robots() - cells;
+  return fmt::format("{} robot{}{} \u00b7 seed {} \u00b7 {} simulated \u00b7 arena {}", robots,
+                     robots == 1 ? "" : "s", cells > 0 ? fmt::format(" \u00b7 {} cells", cells) : "", header.seed(),
+                     time_text(run.paths.last().time_s),
                      world.arena.kind() == ArenaShape::Kind::kRectangle
                          ? fmt::format("{:g} mm \u00d7 {:g} mm", header.arena_width_mm(), header.arena_height_mm())
                          : world.arena.described());

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <vector>
 
 #include "clients/recorder/film.hpp"
 #include "clients/recorder/paths.hpp"
@@ -18,6 +19,10 @@ struct RunOverview {
   Paths paths;
   Film film;
   Floors first_floors, last_floors;
+  std::vector<double>
+      cell_mm;  ///< per robot: the side of its square if it is a cell of a Kilogrid, else 0; empty: no cells
+  /// Number of cells among the robots.
+  [[nodiscard]] std::uint32_t cells() const;
 };
 
 /// Reads all remaining records. Throws UserError if there is no state among them.

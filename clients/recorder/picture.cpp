@@ -27,11 +27,13 @@ constexpr std::array<std::string_view, 6> kByStart = {"#2b4c9b", "#2387b5", "#2a
                                                       "#d9a21b", "#e0702a", "#b8336a"};
 
 /// Paths of all robots. Colours follow x at the start, which makes mixing visible.
-std::string draw_paths(const Paths& paths, const View& view, const Box& start) {
+std::string draw_paths(const RunOverview& run, const View& view, const Box& start) {
+  const Paths& paths = run.paths;
   std::array<std::string, kByStart.size()> ways, ends;
   std::string starts;
   const Snapshot& first = paths.first();
   for (std::size_t i = 0; i < paths.robots(); ++i) {
+    if (!run.cell_mm.empty() && run.cell_mm[i] > 0) continue;
     const double part = start.width_mm() > 0 ? (first.x_mm[i] - start.x_min_mm) / start.width_mm() : 0;
     const std::size_t group = std::min(static_cast<std::size_t>(part * kByStart.size()), kByStart.size() - 1);
     const std::vector<Point> way = simplified(paths.path(i), 0.3 / view.px_per_mm());
@@ -52,7 +54,7 @@ std::string draw_paths(const Paths& paths, const View& view, const Box& start) {
     if (command == 'l') d += "h1";
     put(ends[group], "M{} {}h1", x, y);
   }
-  const double robots = static_cast<double>(paths.robots());
+  const double robots = std::max(1.0, static_cast<double>(paths.robots() - run.cells()));
   const double width = std::clamp(24 - 5 * std::log10(robots), 3.5, 18.0);
   const double opacity = std::clamp(1.3 - 0.2 * std::log10(robots), 0.4, 0.95);
   const double dot =
@@ -85,10 +87,12 @@ std::string draw_frame(const View& view, const Box& box) {
 }
 
 /// The legend of failed robots and of LED colours, the most frequent first, as many as fit.
-std::string led_legend(const Snapshot& at, double x, double y, double width_px) {
+std::string led_legend(const Snapshot& at, const std::vector<double>& cell_mm, double x, double y,
+                       double width_px) {
   std::map<std::uint8_t, std::size_t> counts;
   std::size_t failures = 0;
   for (std::size_t i = 0; i < at.led.size(); ++i) {
+    if (!cell_mm.empty() && cell_mm[i] > 0) continue;
     ++counts[at.led[i] & 63];
     if (failed(at, i)) ++failures;
   }
@@ -175,17 +179,17 @@ std::string picture_svg(const RunOverview& run) {
 
   const Panel start_panel{
       "Start", from,
-      floor(start_view, paths.first()) + draw_discs(paths.first(), start_view) +
+      floor(start_view, paths.first()) + draw_robots(paths.first(), run.cell_mm, start_view) +
           ground.draw_lamps(start_view, paths.first().time_s),
       enlarged > 1.05 ? fmt::format("enlarged {:.1f} times, see dashed frame", enlarged) : part};
   const Panel paths_panel{"Paths", fmt::format("{} to {}", from, to),
-                          floor(view, paths.last()) + draw_paths(paths, view, start) +
+                          floor(view, paths.last()) + draw_paths(run, view, start) +
                               (enlarged > 1.05 ? draw_frame(view, shown_at_start) : ""),
                           part};
-  const Panel end_panel{
-      "End", to,
-      floor(view, paths.last()) + draw_discs(paths.last(), view) + ground.draw_lamps(view, paths.last().time_s),
-      large_discs ? "discs drawn larger than robots" : part};
+  const Panel end_panel{"End", to,
+                        floor(view, paths.last()) + draw_robots(paths.last(), run.cell_mm, view) +
+                            ground.draw_lamps(view, paths.last().time_s),
+                        large_discs ? "discs drawn larger than robots" : part};
 
   const double panel_height = kPanelTitle_px + height_px + kPanelFoot_px;
   const double step_x = stacked ? 0 : width_px + kGap_px, step_y = stacked ? panel_height : 0;
@@ -194,11 +198,11 @@ std::string picture_svg(const RunOverview& run) {
   std::string body = svg::text(kMargin_px, kMargin_px + 16, 22, name, svg::kInk, svg::Anchor::kStart, true);
   body += svg::text(kMargin_px, kMargin_px + 38, 14, facts, svg::kFaint);
   double x = kMargin_px, y = top;
-  body += draw_panel(start_panel, start_view, x, y) + led_legend(paths.first(), x, y + foot, width_px);
+  body += draw_panel(start_panel, start_view, x, y) + led_legend(paths.first(), run.cell_mm, x, y + foot, width_px);
   x += step_x, y += step_y;
   body += draw_panel(paths_panel, view, x, y) + path_legend(x, y + foot);
   x += step_x, y += step_y;
-  body += draw_panel(end_panel, view, x, y) + led_legend(paths.last(), x, y + foot, width_px);
+  body += draw_panel(end_panel, view, x, y) + led_legend(paths.last(), run.cell_mm, x, y + foot, width_px);
   return svg::document(x + width_px + kMargin_px, y + panel_height + 6, name,
                        facts + ". Three panels: start, paths and end of all robots.", body);
 }

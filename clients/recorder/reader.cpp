@@ -57,12 +57,20 @@ bool valid_groups(const proto::RecordingHeader& header) {
   return groups.empty() || std::accumulate(groups.begin(), groups.end(), std::uint64_t{0}) == header.robots();
 }
 
+/// Whether the sides of cells are those of the groups.
+bool valid_cells(const proto::RecordingHeader& header) {
+  const auto& sides = header.group_cell_mm();
+  return sides.empty() ||
+         (sides.size() == header.group_robots_size() &&
+          std::all_of(sides.begin(), sides.end(), [](double side) { return side >= 0 && side <= 1e4; }));
+}
+
 /// Whether the fields have the ranges of idl/experiment.proto.
 bool valid(const proto::RecordingHeader& header) {
   return in_range(header.tick_cycles(), 1 << 15, 1 << 20) && in_range(header.robots(), 1, kMostRobots) &&
          in_range(header.every_s(), 1e-3, 1e9) && in_range(header.arena_width_mm(), 1, 1e6) &&
          in_range(header.arena_height_mm(), 1, 1e6) && valid_tick(header.first_tick()) && valid_groups(header) &&
-         valid_world(header);
+         valid_cells(header) && valid_world(header);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 /// Parts of the recording format beyond idl/recording.proto: frames, header.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -40,6 +41,11 @@ inline constexpr std::uint32_t kLongestRecord_bytes = 1u << 30;
   *header.mutable_movable() = experiment.movable();
   if (experiment.has_light()) *header.mutable_light() = experiment.light();
   for (const proto::RobotGroup& group : experiment.robots()) header.add_group_robots(group.count());
+  const bool any_cells = std::any_of(experiment.robots().begin(), experiment.robots().end(),
+                                     [](const proto::RobotGroup& group) { return group.has_cells(); });
+  for (int g = 0; any_cells && g < experiment.robots_size(); ++g)
+    header.add_group_cell_mm(experiment.robots(g).has_cells() ? experiment.robots(g).layout().grid().pitch_mm()
+                                                              : 0);
   *header.mutable_environment() = experiment.station().environment();
   header.set_messages(experiment.recording().messages());
   for (const proto::ProgramVariable& variable : manifest.variable()) {

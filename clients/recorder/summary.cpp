@@ -315,6 +315,7 @@ void write_summary(const Summary& s, const std::filesystem::path& file) {
     json["worst_lateness_ms"] = s.lateness.worst_s * 1e3;
   }
   if (s.tracked) json["tracking"] = tracking_json(s.tracking);
+  if (s.cells > 0) json["cells"] = s.cells;
   if (s.per_robot.robots == 0) json.erase("messages_per_robot");
   if (!s.monitor.empty()) json["monitor"] = Json::parse(s.monitor);
   os::write_file(file, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
@@ -330,6 +331,7 @@ Summary read_summary(const std::filesystem::path& file) {
     json.at("mode").get_to(s.mode);
     std::tie(s.partition_columns, s.partition_rows) = parsed_partitions(json.at("partitions").get<std::string>());
     json.at("robots").get_to(s.robots);
+    s.cells = json.value("cells", 0u);
     json.at("ticks").get_to(s.ticks);
     json.at("simulated_s").get_to(s.simulated_s);
     json.at("start_s").get_to(s.start_s);
@@ -355,8 +357,9 @@ std::string summary_text(const Summary& s, const std::string& place) {
   const auto line = [&text](std::string_view label, const std::string& rest) {
     text += fmt::format("  {:<10}{}\n", label, rest);
   };
-  text += fmt::format("{}, seed {}: {}, {} simulated s ({} ticks)\n", s.name, s.seed, counted(s.robots, "robot"),
-                      short_number(s.simulated_s), s.ticks);
+  const std::string cells = s.cells > 0 ? fmt::format(" and {}", counted(s.cells, "cell")) : "";
+  text += fmt::format("{}, seed {}: {}{}, {} simulated s ({} ticks)\n", s.name, s.seed, counted(s.robots, "robot"),
+                      cells, short_number(s.simulated_s), s.ticks);
   std::string how = fmt::format("{} s of wall time, {} times real time, after {} s to start",
                                 short_number(s.wall_s), short_number(s.realtime_factor()), short_number(s.start_s));
   if (s.resumed_from_tick > 0) how += fmt::format("; resumed from tick {}", s.resumed_from_tick);
@@ -405,7 +408,7 @@ std::string summary_text(const Summary& s, const std::string& place) {
   line("used",
        fmt::format("{} s of CPU time, {} MiB of memory", short_number(s.cpu_s), short_number(s.peak_memory_mib)));
   line("hash", fmt::format("{:016x}", s.state_hash));
-  const bool moves = s.robots <= Film::kMostRobots;
+  const bool moves = s.robots + s.cells <= Film::kMostRobots;
   line("results", fmt::format("{}: report.html, summary.json, picture.svg, {}recording.ktrec", place,
                               moves ? "animation.svg, " : ""));
   return text;

@@ -19,7 +19,8 @@ struct Summary {
   std::string mode;                                         ///< "local" or "federated"
   std::uint32_t partition_columns = 1, partition_rows = 1;  ///< partitions: "2x1", as for --partitions
   std::uint32_t hosts = 1;
-  std::uint32_t robots = 0;
+  std::uint32_t robots = 0;              ///< without cells
+  std::uint32_t cells = 0;               ///< of a Kilogrid; in the file where there are any
   std::int64_t ticks = 0;                ///< the run's last tick
   std::int64_t resumed_from_tick = 0;    ///< 0 if the run started at tick 0
   std::int64_t recovered_from_tick = 0;  ///< tick of the last recovery's checkpoint; 0: no recovery

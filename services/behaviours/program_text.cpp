@@ -312,20 +312,45 @@ bool is_cpp(const fs::path& source) {
   return extension == ".cpp" || extension == ".cc" || extension == ".cxx" || extension == ".C";
 }
 
-Kilolib kilolib_of(const std::vector<fs::path>& sources) {
+namespace {
+
+/// A header of the Kilogrid's kilolib: a copy of it beside a program says nothing about the program.
+bool is_kilogrid_header(const std::string& name) {
+  const auto files = runtime_files();
+  return std::any_of(files.begin(), files.end(),
+                     [&](const RuntimeFile& file) { return file.name == "kilogrid/" + name; });
+}
+
+Kilolib kilolib_of_file(const fs::path& file, std::set<fs::path>& searched) {
   static const std::regex kModule(R"(\bmodule_(init|start)\s*\()"), kMessage(R"(\bIR_message_t\b)");
+  if (!searched.insert(file.lexically_normal()).second) return Kilolib::kKilobot;
+  const std::string text = os::read_if_there(file).value_or("");
+  // Most programs mention neither, and std::regex is slow.
+  if (text.find("module_") != std::string::npos && std::regex_search(code_of(text), kModule))
+    return Kilolib::kKilogridModule;
+  const bool has_message =
+      text.find("IR_message_t") != std::string::npos && std::regex_search(code_of(text), kMessage);
+  Kilolib result = has_message ? Kilolib::kKilogridRobot : Kilolib::kKilobot;
+  for (const Include& include : includes_of(text)) {
+    const std::string name = fs::path(include.name).filename().string();
+    if (name.starts_with("kilob_") || name == "kilo_rand_lib.h") result = Kilolib::kKilogridRobot;
+    if (!include.quoted || is_kilogrid_header(name)) continue;
+    const Kilolib shown = kilolib_of_file(file.parent_path() / include.name, searched);
+    if (shown == Kilolib::kKilogridModule) return shown;
+    if (shown != Kilolib::kKilobot) result = shown;
+  }
+  return result;
+}
+
+}  // namespace
+
+Kilolib kilolib_of(const std::vector<fs::path>& sources) {
   Kilolib result = Kilolib::kKilobot;
+  std::set<fs::path> searched;
   for (const fs::path& source : sources) {
-    const std::string text = os::read_if_there(source).value_or("");
-    // Most programs mention neither, and std::regex is slow.
-    if (text.find("module_") != std::string::npos && std::regex_search(code_of(text), kModule))
-      return Kilolib::kKilogridModule;
-    if (text.find("IR_message_t") != std::string::npos && std::regex_search(code_of(text), kMessage))
-      result = Kilolib::kKilogridRobot;
-    for (const Include& include : includes_of(text)) {
-      const std::string name = fs::path(include.name).filename().string();
-      if (name.starts_with("kilob_") || name == "kilo_rand_lib.h") result = Kilolib::kKilogridRobot;
-    }
+    const Kilolib shown = kilolib_of_file(source, searched);
+    if (shown == Kilolib::kKilogridModule) return shown;
+    if (shown != Kilolib::kKilobot) result = shown;
   }
   return result;
 }

@@ -18,7 +18,7 @@ enum class Kilolib : std::uint8_t {
   kKilogridModule  ///< that of the Kilogrid's cells: module_init(), set_IR_message()
 };
 
-/// Finds out by names that only one of the libraries has.
+/// Finds out by names that only one of the libraries has, in the sources and in the local headers that they include.
 [[nodiscard]] Kilolib kilolib_of(const std::vector<std::filesystem::path>& sources);
 
 struct ProgramText {

@@ -28,7 +28,8 @@ Population::Population(const RunPlan& plan, PartitionId partition, DriveModel dr
       // All partitions know all movable bodies.
       neighbours_(plan.grid.neighbours(partition, plan.movables() > 0 ? 1e300 : margin_mm_)),
       merge_(robots_) {
-  for (Bodies* const bodies : {&listed_, &tracked_, &known_, &previous_}) bodies->remembered = memory_.size();
+  for (Bodies* const bodies : {&listed_, &tracked_, &known_, &previous_, &absentees_, &merged_})
+    bodies->remembered = memory_.size();
   for (std::uint32_t robot = 0; robot < robots_; ++robot) {
     const Pose pose = plan.initial_pose(robot);
     const double x = pose.x_mm, y = pose.y_mm, heading = wrapped(pose.heading_rad);
@@ -39,7 +40,6 @@ Population::Population(const RunPlan& plan, PartitionId partition, DriveModel dr
       is_tracked_[robot] = 1;
       tracked_.add(robot, x, y, heading, 1, 1);
       absent_.push_back(is_cell || !plan.tracking_settings().present_at_start);
-      absentees_ += absent_.back();
       on_other_.push_back(0);
       memory_.start(robot, tracked_.memory_of(tracked_.size() - 1));
     }
@@ -92,9 +92,8 @@ void Population::take_tracked(const Inputs& inputs) {
   };
   for (const MembershipChange& change : inputs.memberships) {
     std::uint8_t& absent = absent_[entry_of(change.robot)];
-    absentees_ -= absent;
     absent = static_cast<std::uint8_t>(change.membership != Membership::kJoined);
-    absentees_ += absent;
+    absentees_are_listed_ = false;
   }
   if (inputs.tracking == nullptr) return;
   const TrackingFrame& frame = *inputs.tracking;
@@ -147,18 +146,24 @@ void Population::relocate(std::span<const Relocation> relocations) {
   }
 }
 
-/// Absent robots have their place in the list, among the others.
+/// Absent robots have their place in the list, among the others. Nothing moves them.
 void Population::list_absent() {
-  Bodies all;
-  all.remembered = memory_.size();
-  std::size_t next = 0;
-  for (std::size_t i = 0; i < tracked_.size(); ++i) {
-    if (absent_[i] == 0 || !is_own(tracked_.x_mm[i], tracked_.y_mm[i])) continue;
-    while (next < listed_.size() && listed_.robot[next] < tracked_.robot[i]) all.add(listed_, next++);
-    all.add(tracked_, i);
+  if (!absentees_are_listed_) {
+    absentees_.clear();
+    for (std::size_t i = 0; i < tracked_.size(); ++i) {
+      if (absent_[i] != 0 && is_own(tracked_.x_mm[i], tracked_.y_mm[i])) absentees_.add(tracked_, i);
+    }
+    absentees_are_listed_ = true;
   }
-  while (next < listed_.size()) all.add(listed_, next++);
-  listed_.swap(all);
+  if (absentees_.size() == 0) return;
+  merged_.clear();
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < absentees_.size(); ++i) {
+    while (next < listed_.size() && listed_.robot[next] < absentees_.robot[i]) merged_.add(listed_, next++);
+    merged_.add(absentees_, i);
+  }
+  while (next < listed_.size()) merged_.add(listed_, next++);
+  listed_.swap(merged_);
 }
 
 void Population::gather(std::span<const BodyFrame* const> ghosts) {
@@ -248,7 +253,7 @@ void Population::end() {
       if (own_[i] != 0) listed_.add(known_, i);
     }
   }
-  if (absentees_ > 0) list_absent();
+  list_absent();
 }
 
 void Population::emit_bodies(BodyFrame& frame) const {
@@ -354,7 +359,7 @@ void Population::load(Tick tick, std::span<const proto::PhysicsState* const> par
       absent_[static_cast<std::size_t>(found - tracked_.robot.begin())] = 1;
     }
   }
-  absentees_ = static_cast<std::size_t>(std::count(absent_.begin(), absent_.end(), std::uint8_t{1}));
+  absentees_are_listed_ = false;
   fields_.load(parts);
   tick_ = tick;
 }

@@ -95,10 +95,12 @@ class Population {
   std::vector<std::uint8_t> absent_;    ///< per entry of tracked_
   std::vector<std::uint8_t> on_other_;  ///< per entry of tracked_, 1: it stood on another body after the last step
   std::uint32_t without_space_ = 0;
-  std::size_t absentees_ = 0;  ///< how many of absent_
+  Bodies absentees_;                   ///< own absent bodies, of tracked_
+  bool absentees_are_listed_ = false;  ///< absentees_ is up to date
 
   // Within a step.
   Bodies known_, previous_;        ///< of the current step and of the one before
+  Bodies merged_;                  ///< scratch of list_absent()
   std::vector<std::uint8_t> own_;  ///< per known body, by its pose before the step; empty with one partition
   Merge merge_;
   std::vector<const ActuationFrame*> frames_;

@@ -102,6 +102,27 @@ TEST_F(KilogridCells, RobotsHearTheCellBelowThemAndCellsTheRobotsAbove) {
   for (const int beside : {6, 9, 12, 13}) EXPECT_EQ(reports(4 + beside), "") << beside;
 }
 
+TEST_F(KilogridCells, CountApartFromRobots) {
+  const recorder::Summary summary = run({scratch / "grid.txtpb", "--mode", "local"}, scratch, "run");
+  EXPECT_EQ(summary.robots, 4u);
+  EXPECT_EQ(summary.cells, 16u);
+  EXPECT_EQ(summary.per_robot.robots, 4u);
+  // One robot of four drives; cells would bring the mean to a fifth of it.
+  EXPECT_NEAR(summary.moved_mm.mean, summary.moved_mm.max / 4, 0.01 * summary.moved_mm.max);
+}
+
+TEST_F(KilogridCells, TheLibraryCanBeNamed) {
+  write(scratch.path() / "plain.c",
+        "#include <kilolib.h>\nstatic void setup(void) {}\n"
+        "static void loop(void) { set_color(TRACKING & 3); }\n"
+        "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
+  write(scratch.path() / "plain.txtpb", "duration_s: 1 robots { count: 1 behaviour: \"plain.c\" }\n");
+  const std::string experiment = scratch / "plain.txtpb";
+  EXPECT_EQ(kilotwin({"check", experiment}, scratch).status, 2) << "kilolib has no TRACKING";
+  EXPECT_EQ(kilotwin({"check", experiment, "--kilolib", "kilogrid"}, scratch).status, 0);
+  EXPECT_EQ(kilotwin({"check", experiment, "--kilolib", "kilogird"}, scratch).status, 2);
+}
+
 TEST_F(KilogridCells, BlockNobody) {
   (void)run({scratch / "grid.txtpb", "--mode", "local"}, scratch, "with");
   write_experiment("");

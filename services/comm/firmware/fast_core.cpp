@@ -103,8 +103,7 @@ FastCore::FastCore(const avr_t& avr)
     : flash_(avr.flash), operations_(std::make_unique<std::array<Operation, kFlashOctets / 2>>()) {
   for (std::uint32_t address = kRegisters; address < kRam; ++address) {
     const auto& one = avr.io[address - kRegisters];
-    const bool plain =
-        one.r.c == nullptr && (one.irq == nullptr || address == kAdcsra) && address != kSreg;
+    const bool plain = one.r.c == nullptr && (one.irq == nullptr || address == kAdcsra) && address != kSreg;
     const bool is_own = address == kSpl || address == kSph;
     plain_[address] = plain;
     if ((plain && !is_own) || is_direction(address) || is_direction(address - 1)) inputs_[address] = 0xff;

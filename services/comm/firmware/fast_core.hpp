@@ -65,8 +65,9 @@ class FastCore {
   struct Anchor {
     std::uint32_t pc = kNowhere;
     std::uint64_t cycle = 0;
-    std::uint32_t jumps = 0;                ///< backward ones since
-    std::uint32_t patience = kFirstPatience;  ///< number of backward jumps after which a later state replaces this one
+    std::uint32_t jumps = 0;  ///< backward ones since
+    std::uint32_t patience =
+        kFirstPatience;  ///< number of backward jumps after which a later state replaces this one
     Memory memory;
   };
 

@@ -52,6 +52,26 @@ TEST(Picture, ShowsTitleTimesLegendAndScale) {
   EXPECT_EQ(ground->attribute("fill"), "#ffffff");
 }
 
+TEST(Picture, CellsAreSquaresAndCountApart) {
+  const Scratch scratch;
+  proto::RecordingHeader header = synthetic_header(8);
+  for (const std::uint32_t count : {5u, 3u}) header.add_group_robots(count);
+  for (const double side : {0.0, 50.0}) header.add_group_cell_mm(side);
+  const Xml xml(picture_of(scratch, header, 300));
+  EXPECT_TRUE(xml.has_text("5 robots"));
+  EXPECT_TRUE(xml.has_text("3 cells"));
+  // Robots 0 to 4 are discs of the LED's colour i; the cells 5 to 7 are squares, with one path per colour and panel.
+  EXPECT_EQ(discs(xml, svg::led_colour(4)), 2u);
+  EXPECT_EQ(discs(xml, svg::led_colour(5)), 0u);
+  const auto squares = std::count_if(xml.elements().begin(), xml.elements().end(),
+                                     [](const Element& e) { return e.attribute("class") == "cells"; });
+  EXPECT_EQ(squares, 2 * 3);
+  EXPECT_FALSE(xml.has_text("failed 1")) << "the last cell, not a robot";
+
+  header.add_group_cell_mm(50);
+  EXPECT_THROW((void)picture_of(scratch, header, 30), UserError) << "sides of more groups than there are";
+}
+
 TEST(Picture, ShowsLampsWhereTheyAre) {
   const Scratch scratch;
   proto::RecordingHeader header = synthetic_header(4);

@@ -66,6 +66,12 @@ TEST(KilogridPrograms, AreRecognisedByTheirNames) {
             Kilolib::kKilobot);
   EXPECT_TRUE(
       mentions(compile({folder.path() / "robot.c"}, cached()).notes, "compiled with the Kilogrid's kilolib"));
+  // Headers of the program decide too, and those that they include. Copies of the library's own headers say nothing.
+  folder.write("inner.h", "typedef struct { IR_message_t last; } heard_t;\n");
+  folder.write("outer.h", "#include \"inner.h\"\n");
+  EXPECT_EQ(kilolib_of({folder.write("split.c", "#include \"outer.h\"\n")}), Kilolib::kKilogridRobot);
+  folder.write("module.h", "void module_init(void);\n");
+  EXPECT_EQ(kilolib_of({folder.write("copied.c", "#include \"module.h\"\nmessage_t m;\n")}), Kilolib::kKilobot);
   // Types that only the Kilogrid has stay free for other programs.
   EXPECT_NO_THROW((void)compile({folder.write("other.c", program("enum { TRACKING, TURN_LEFT };"))}, cached()));
   CompileOptions named = cached();

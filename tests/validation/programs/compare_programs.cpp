@@ -5,9 +5,9 @@
 //   --robots N     robots per run, 4
 //   --duration S   simulated seconds per run, 12
 //   --light TEXT   the experiment's field `light`, in protobuf text format
-//   --results F    the table as a page
+//   --results F    the results as a page; with --folder by repository, DIR/OWNER/NAME
 //   --quick        8 s, of the set that was written for this comparison
-// Ends with status 1 where a program does not run, or differs and is not known to.
+// Ends with status 1 where a program differs or does not run and causes.csv does not say why.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -15,7 +15,6 @@
 #include <array>
 #include <cctype>
 #include <cstdlib>
-#include <fstream>
 #include <mutex>
 #include <set>
 
@@ -24,6 +23,7 @@
 #include "core/os/files.hpp"
 #include "core/os/worker_pool.hpp"
 #include "tests/validation/programs/pair.hpp"
+#include "tests/validation/programs/result_pages.hpp"
 
 namespace {
 
@@ -38,20 +38,11 @@ struct Arguments {
   std::vector<std::string> names;
 };
 
-struct Row {
-  std::string name, verdict, detail, changes, note;
-  int seeds = 0;
-  bool ran = false, agrees = false, known = false;
-};
-
-/// Seeds of a program with a measure that differs by more than 10 % with one seed; of one that the test then tells apart.
-constexpr int kMoreSeeds = static_cast<int>(kLeastRuns), kMostSeeds = 3 * kMoreSeeds;
-
-/// Programs of the repository that are known to differ: docs/explanation/validation.md says why.
-constexpr std::array kKnown{"overflowing_sum.c", "waits_in_callback.c", "follow.c"};
-
-bool is_known(const fs::path& program) {
-  return std::find(kKnown.begin(), kKnown.end(), program.filename().string()) != kKnown.end();
+/// The text without the path of the folder that is compared.
+std::string without(std::string text, const fs::path& root) {
+  const std::string prefix = fs::absolute(root).lexically_normal().string() + "/";
+  for (std::size_t at; (at = text.find(prefix)) != std::string::npos;) text.erase(at, prefix.size());
+  return text;
 }
 
 /// Files that hold a main(), in the order of their names. Of files that differ in white space alone the first.
@@ -95,9 +86,10 @@ std::vector<fs::path> chosen(const Arguments& arguments) {
   return all;
 }
 
-Row row_of(const PairSettings& settings, const fs::path& program, const fs::path& root) {
+Row row_of(const PairSettings& settings, const fs::path& program, const fs::path& root, const Causes& causes) {
   Row row;
   row.name = program.lexically_relative(root).string();
+  row.cause = causes.of(row.name);
   std::array<Outcome, 2> outcomes;
   Comparison result;
   for (const int seeds : {1, kMoreSeeds, kMostSeeds}) {
@@ -106,17 +98,18 @@ Row row_of(const PairSettings& settings, const fs::path& program, const fs::path
       run_program(settings, program, avr, row.seeds + 1, seeds, outcome);
       if (outcome.refusal.empty()) continue;
       row.verdict = fmt::format("{} does not run", avr ? "firmware" : "native");
-      row.note = outcome.refusal;
+      row.note = without(outcome.refusal, root);
+      row.known = !row.cause.empty();
       return row;
     }
     row.seeds = seeds;
     result = compare(outcomes[0], outcomes[1]);
-    if (result.event_exact || result.agrees || (seeds >= kMoreSeeds && is_known(program))) break;
+    if (result.event_exact || result.agrees || (seeds >= kMoreSeeds && !row.cause.empty())) break;
   }
   row.note = outcomes[0].warning;
   row.ran = true;
   row.agrees = result.agrees || result.event_exact;
-  row.known = !row.agrees && is_known(program);
+  row.known = !row.agrees && !row.cause.empty();
   row.changes = fmt::format("{} of {}, {}", result.same_changes, result.native_changes, result.firmware_changes);
   row.verdict = result.event_exact    ? "event for event"
                 : result.within_tenth ? "alike"
@@ -129,44 +122,12 @@ Row row_of(const PairSettings& settings, const fs::path& program, const fs::path
   return row;
 }
 
-std::string table_of(const std::vector<Row>& rows) {
-  std::string table =
-      "| program | verdict | seeds | changes alike, of native, of firmware | largest difference: native, firmware "
-      "|\n"
-      "|---|---|---|---|---|\n";
-  for (const Row& row : rows)
-    table +=
-        fmt::format("| `{}` | {} | {} | {} | {} |\n", row.name, row.verdict, row.seeds, row.changes, row.detail);
-  return table;
-}
-
-void write_results(const Arguments& arguments, const std::vector<Row>& rows, const std::string& end) {
-  std::ofstream(arguments.results)
-      << fmt::format(
-             "\n{} robots, {} s, the default `loop_rate`, no noise of motion. A "
-             "program runs with seed 1. If a measure\n"
-             "differs by more than 10 %, it runs with seeds 1 to {}. If the test then "
-             "tells both kinds apart, it runs with\nseeds 1 to {}, and the test is made "
-             "again.\n\n"
-             "| verdict | meaning |\n|---|---|\n"
-             "| event for event | every change of motors and LED comes within one "
-             "tick, and the counts of messages are equal |\n"
-             "| alike | the means of path, distance, LED and messages differ by at "
-             "most 10 % |\n"
-             "| not distinguishable | a measure differs by more than 10 %, and a "
-             "permutation test over runs gives p >= {:.4f} |\n"
-             "| differs | a measure differs by more than 10 %, and the test gives p "
-             "< {:.4f} |\n\n",
-             arguments.settings.robots, arguments.settings.duration_s, kMoreSeeds, kMostSeeds, kLevel, kLevel)
-      << table_of(rows) << "\n"
-      << end;
-}
-
 int compare_all(const Arguments& arguments) {
   std::string scratch = (fs::temp_directory_path() / "kilotwin-programs-XXXXXX").string();
   if (mkdtemp(scratch.data()) == nullptr) throw RunError("no scratch directory can be made");
   const std::vector<fs::path> programs = chosen(arguments);
   const fs::path root = arguments.folder.empty() ? fs::path(KILOTWIN_SOURCES) : fs::path(arguments.folder);
+  const Causes causes(fs::path(KILOTWIN_SOURCES) / "tests/validation/programs/causes.csv");
   std::vector<Row> rows(programs.size());
   std::mutex printing;
   os::WorkerPool(os::cores()).for_each(programs.size(), [&](std::size_t i) {
@@ -174,7 +135,7 @@ int compare_all(const Arguments& arguments) {
     own.kilotwin = KILOTWIN_PROGRAM;
     own.scratch = fs::path(scratch) / std::to_string(i);
     fs::create_directories(own.scratch);
-    rows[i] = row_of(own, programs[i], root);
+    rows[i] = row_of(own, programs[i], root, causes);
     fs::remove_all(own.scratch);
     const std::lock_guard lock(printing);
     fmt::print("{:<46} {:<20} {:>2} {:<20} {}\n", rows[i].name, rows[i].verdict, rows[i].seeds, rows[i].changes,
@@ -182,17 +143,12 @@ int compare_all(const Arguments& arguments) {
     std::fflush(stdout);
   });
   fs::remove_all(scratch);
-  std::size_t ran = 0, agree = 0, known = 0;
-  for (const Row& row : rows) {
-    ran += row.ran ? 1 : 0;
-    agree += row.agrees ? 1 : 0;
-    known += row.known ? 1 : 0;
+  fmt::print("\n{}", totals(rows));
+  if (!arguments.results.empty()) {
+    const PairSettings& used = arguments.settings;
+    os::write_file(arguments.results, arguments.folder.empty() ? own_page(rows, used) : public_page(rows, used));
   }
-  const std::string end =
-      fmt::format("{} of {} programs that run both ways agree; {} do not run\n", agree, ran, rows.size() - ran);
-  fmt::print("\n{}", end);
-  if (!arguments.results.empty()) write_results(arguments, rows, end);
-  return agree + known == rows.size() ? 0 : 1;
+  return std::all_of(rows.begin(), rows.end(), [](const Row& row) { return row.agrees || row.known; }) ? 0 : 1;
 }
 
 int usage() {
