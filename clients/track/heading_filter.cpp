@@ -153,6 +153,8 @@ void HeadingFilter::predict_turned(Hypothesis& h, double dt_s) {
 
 void HeadingFilter::predict(double dt_s) {
   for (std::size_t i = 0; i < kModes; ++i) {
+    // A hypothesis that is out of the question is made anew by mix(). Until then its errors would grow beyond any bound.
+    if (weights_[i] == 0) continue;
     Hypothesis& h = hypotheses_[i];
     if (i == kHeld) {
       predict_held(h, dt_s);
@@ -200,6 +202,7 @@ void HeadingFilter::predict(double dt_s) {
 void HeadingFilter::measure(double x_mm, double y_mm, double sd_mm) {
   std::array<double, kModes> likelihoods{};
   for (std::size_t i = 0; i < kModes; ++i) {
+    if (weights_[i] == 0) continue;
     Hypothesis& h = hypotheses_[i];
     Eigen::Matrix2d total = h.covariance.topLeftCorner<2, 2>();
     total.diagonal().array() += sd_mm * sd_mm;

@@ -20,6 +20,8 @@ constexpr double kRimFrom = 0.72, kRimTo = 0.95, kBrightRim = 0.8;
 constexpr double kLeastLight = 0.10;
 /// A second channel with this share of the strongest one belongs to the colour.
 constexpr double kMixed = 0.5;
+/// No class is clear if the centre of another robot is nearer than this, radii: its light may be taken for this robot's.
+constexpr double kAlone = 3.0;
 /// A class is clear below this share of the second channel; and above, or below, these multiples of the least light.
 constexpr double kPure = 0.3, kClearlyLit = 2, kClearlyDark = 0.5;
 /// Where even the weakest one has this share, the light is white.
@@ -299,15 +301,18 @@ LedReading read_led(const cv::Mat& picture, const Circle& disc, const std::vecto
     remove(light, disc, spot);
     spot = brightest(light, disc);
   }
+  const bool alone = std::none_of(others.begin(), others.end(), [&](const Circle& other) {
+    return distance(other.centre.x_px, other.centre.y_px, disc) < kAlone * disc.radius_px;
+  });
   LedReading reading;
   reading.strength = spot.strength;
   if (spot.strength < kLeastLight) {
-    reading.clear = spot.strength < kClearlyDark * kLeastLight;
+    reading.clear = alone && spot.strength < kClearlyDark * kLeastLight;
     return reading;
   }
   const Hue hue = classify(light, disc, spot);
   reading.led = hue.led;
-  reading.clear = hue.pure && spot.strength > kClearlyLit * kLeastLight;
+  reading.clear = alone && hue.pure && spot.strength > kClearlyLit * kLeastLight;
   const double dx = light.left + spot.x * light.stride - disc.centre.x_px,
                dy = light.top + spot.y * light.stride - disc.centre.y_px;
   if (std::hypot(dx, dy) > 0.4 * disc.radius_px) reading.bearing_rad = std::atan2(-dy, dx);

@@ -22,7 +22,8 @@ enum class Led : std::uint8_t { kOff, kRed, kGreen, kBlue, kYellow, kMagenta, kC
 
 struct LedReading {
   Led led = Led::kOff;
-  /// Far from the borders to other classes, and one channel alone or none: no picture that was exposed during a change.
+  /// Far from the borders to other classes, one channel alone or none, and no other robot near: neither a picture that was
+  /// exposed during a change, nor a neighbour's light.
   bool clear = false;
   /// Strength of the light: mean excess over the floor's brightness within the spot, 1 is the floor itself.
   double strength = 0;

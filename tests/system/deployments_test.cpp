@@ -1,6 +1,6 @@
 // Deployments c and d of docs/how-to/swap-deployments.md. A second, independent experiment plays the real world: its robots are
 // seen in pictures alone, and are driven through a serial line alone. Its states, which nothing of the deployment reads, are the
-// truth. All programs keep half the pace of real time, so that a busy machine keeps it too.
+// truth. Where robots get lost, as a busy machine may leave the run without pictures, all is done again at half the pace.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -13,7 +13,6 @@
 #include <mutex>
 #include <optional>
 #include <thread>
-#include <tuple>
 #include <vector>
 
 #include "clients/observe/observer.hpp"
@@ -21,6 +20,7 @@
 #include "core/base/pose.hpp"
 #include "core/federation/topics.hpp"
 #include "tests/system/ceiling.hpp"
+#include "tests/system/own_domain.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::test {
@@ -30,7 +30,8 @@ namespace fs = std::filesystem;
 
 const Ceiling kCeiling{700, 500};
 constexpr int kRobots = 5;
-constexpr double kPace = 0.5, kPictures_per_s = 12;
+constexpr std::size_t kSimulated = 6;  // of deployment d
+constexpr double kPictures_per_s = 24;  // simulated
 constexpr double kDegree = kPi / 180;
 
 /// A state of a run: what an observer saw, and when that was.
@@ -85,6 +86,11 @@ class Witness {
   std::jthread thread_;
 };
 
+/// UTC.
+double wall_now_s() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
 /// When the tracker's samples were taken and when they came, UTC.
 class Samples {
  public:
@@ -105,8 +111,8 @@ class Samples {
 
  private:
   void add(std::int64_t capture_ns) {
-    using std::chrono::duration, std::chrono::steady_clock, std::chrono::system_clock;
-    const double now_s = duration<double>(system_clock::now().time_since_epoch()).count();
+    using std::chrono::duration, std::chrono::steady_clock;
+    const double now_s = wall_now_s();
     const double steady_s = duration<double>(steady_clock::now().time_since_epoch()).count();
     const std::lock_guard lock(mutex_);
     samples_.emplace_back(now_s - (steady_s - 1e-9 * static_cast<double>(capture_ns)), now_s);
@@ -252,8 +258,8 @@ Comparison compare(const World& world, const std::vector<Moment>& seen, Samples&
   return result;
 }
 
-/// For each robot of the deployment, from `first` on, the robot of the world at its place.
-std::vector<std::size_t> nearest(const World& world, const Moment& moment, std::size_t first) {
+/// For each robot of the deployment, from `first` on, the robot of the world at its place. Nothing where one is at no place.
+std::optional<std::vector<std::size_t>> nearest(const World& world, const Moment& moment, std::size_t first) {
   std::vector<std::size_t> whose(kRobots);
   for (std::size_t i = 0; i < kRobots; ++i) {
     const Pose& pose = moment.poses[first + i];
@@ -266,17 +272,14 @@ std::vector<std::size_t> nearest(const World& world, const Moment& moment, std::
       least_mm = off_mm;
       whose[i] = robot;
     }
-    EXPECT_LT(least_mm, 5);
+    if (least_mm >= 5) return std::nullopt;
   }
   return whose;
 }
 
 class Deployments : public testing::Test {
  protected:
-  Deployments() {
-    std::tie(here_, there_) = two_domains();
-    write(scratch_ / "ceiling.yaml", kCeiling.calibration());
-  }
+  Deployments() { write(scratch_ / "ceiling.yaml", kCeiling.calibration()); }
 
   [[nodiscard]] static std::string arena() {
     return fmt::format("arena {{ width_mm: {} height_mm: {} }}\n", kCeiling.width_mm, kCeiling.height_mm);
@@ -286,17 +289,31 @@ class Deployments : public testing::Test {
     words.insert(words.end(), more.begin(), more.end());
     return std::make_unique<Process>(words, scratch_.path());
   }
+  /// `attempt` judges a comparison, or leaves it to the next attempt.
+  template <class Attempt> void at_a_pace_that_is_kept(Attempt attempt) {
+    for (pace_ = 1; pace_ >= kSlowest && !judged_ && !HasFatalFailure(); pace_ /= 2) attempt();
+    EXPECT_TRUE(judged_);
+  }
+  /// A robot that gets lost tells of a busy machine, or of a bad tracker: the slowest attempt decides.
+  void judge(const Comparison& result) {
+    fmt::print("pace {}: absent {} times\n", pace_, result.absent);
+    if (result.absent > 0 && pace_ > kSlowest) return;
+    judged_ = true;
+    expect_as_asked(result);
+  }
   std::unique_ptr<Process> start_run(const std::string& file, const std::string& domain, const std::string& out,
                                      const Words& more = {}) {
-    Words words{"run",  scratch_ / file, "--pace",      fmt::format("{}", kPace), "--quiet", "--domain",
+    Words words{"run",  scratch_ / file, "--pace",      fmt::format("{}", pace_), "--quiet", "--domain",
                 domain, "--out",         scratch_ / out};
     words.insert(words.end(), more.begin(), more.end());
+    fs::remove_all(scratch_ / out);
     return start(program(), words);
   }
   /// The camera above the world. It rewrites one picture, and each picture tells when it was taken.
   std::unique_ptr<Process> start_camera() {
+    fs::remove(scratch_ / "ceiling.jpg");
     return start(KILOTWIN_VISION, {"cameras", "--domain", there_, "--picture", scratch_ / "ceiling.jpg", "--size",
-                                   kCeiling.size(), "--fps", fmt::format("{}", kPictures_per_s), "--noise", "3",
+                                   kCeiling.size(), "--fps", fmt::format("{}", kPictures_per_s * pace_), "--noise", "3",
                                    "--blur", "0.7", "--uneven-light", "0.2"});
   }
   std::unique_ptr<Process> start_tracker(const Words& more = {}) {
@@ -316,6 +333,9 @@ class Deployments : public testing::Test {
     words.insert(words.end(), more.begin(), more.end());
     return start(KILOTWIN_VISION, words);
   }
+  /// One attempt of each deployment.
+  void play_c();
+  void play_d();
   static void expect_as_asked(const Comparison& result) {
     const auto percent = [](long right, long of) {
       return 100 * static_cast<double>(right) / static_cast<double>(std::max(1L, of));
@@ -349,8 +369,12 @@ class Deployments : public testing::Test {
     EXPECT_EQ(verified.status, 0) << verified.err;
   }
 
+  static constexpr double kSlowest = 0.25;
   Scratch scratch_;
-  std::string here_, there_;
+  double pace_ = 1;
+  bool judged_ = false;
+  const OwnDomain own_here_, own_there_;
+  const std::string &here_ = own_here_.name, &there_ = own_there_.name;
 };
 
 TEST_F(Deployments, CTheSimulatedStationDrivesRobotsThatACameraSees) {
@@ -367,6 +391,11 @@ TEST_F(Deployments, CTheSimulatedStationDrivesRobotsThatACameraSees) {
           "  environment { foraging { home_x_mm: 200 home_y_mm: 0 home_radius_mm: 90 food_x_mm: -200 food_y_mm: 0 "
           "food_radius_mm: 90 } }\n"
           "}\n");
+  at_a_pace_that_is_kept([this] { play_c(); });
+}
+
+void Deployments::play_c() {
+  fs::remove(scratch_ / "port");  // of an attempt before
   const auto virtual_controller = start(program(), {"ohc", "--pty", scratch_ / "port", "--domain", there_});
   ASSERT_TRUE(eventually([&] { return fs::is_symlink(scratch_ / "port"); }));
   const auto camera = start_camera();
@@ -383,7 +412,7 @@ TEST_F(Deployments, CTheSimulatedStationDrivesRobotsThatACameraSees) {
       {"--set", "robots.body=TRACKED", "--set", "robots.says.shadow=true", "--set", "tracking.start=WHEN_SEEN"});
   ASSERT_TRUE(tracker->says(fmt::format("identification: {0} of {0} robots have their numbers", kRobots), 120));
   const double from_s = of_run.time_s() + 3;
-  constexpr double kLasts_s = 16;
+  constexpr double kLasts_s = 20;
   ASSERT_TRUE(eventually([&] { return of_run.time_s() > from_s + kLasts_s; }, 200));
   end(*run, "run");
   world_run->signal(SIGINT);
@@ -391,7 +420,7 @@ TEST_F(Deployments, CTheSimulatedStationDrivesRobotsThatACameraSees) {
   const World world(of_world.moments());
   constexpr std::uint8_t kRed = 3;
   EXPECT_TRUE(world.any_led(kRed)) << "a robot took a load, as the station told it";
-  expect_as_asked(compare(world, of_run.moments(), samples, 0, {0, 1, 2, 3, 4}, from_s));
+  judge(compare(world, of_run.moments(), samples, 0, {0, 1, 2, 3, 4}, from_s));
 }
 
 /// Robots of the real world that walk at random, with LEDs that tell nothing of their motion.
@@ -425,13 +454,16 @@ TEST_F(Deployments, DSimulatedRobotsMoveAmongThoseThatACameraSees) {
             "name: \"world\" duration_s: 900 seed: 3\n{}robots {{ count: {} behaviour: \"wander.c\" layout {{ "
             "grid {{ pitch_mm: 110 }} }} }}\n",
             arena(), kRobots));
-  constexpr std::size_t kSimulated = 6;
   write(scratch_ / "hybrid.txtpb",
         fmt::format("name: \"hybrid\" duration_s: 900\n{}tracker {{ source: \"ceiling\" first_robot: {} }}\n"
                     "tracking {{ start: WHEN_SEEN }}\n"
                     "robots {{ count: {} behaviour: \"{}\" layout {{ y_mm: -180 grid {{ pitch_mm: 60 }} }} }}\n"
                     "robots {{ count: {} body: TRACKED layout {{ y_mm: 150 grid {{ pitch_mm: 60 }} }} }}\n",
                     arena(), kSimulated, kSimulated, source("behaviours/disperse.c"), kRobots));
+  at_a_pace_that_is_kept([this] { play_d(); });
+}
+
+void Deployments::play_d() {
   const auto camera = start_camera();
   Witness of_world(there_), of_run(here_);
   Samples samples(here_);
@@ -449,11 +481,16 @@ TEST_F(Deployments, DSimulatedRobotsMoveAmongThoseThatACameraSees) {
   // Who is who is found once, by place, and stays so.
   const auto begin = std::find_if(seen.begin(), seen.end(), [](const Moment& m) { return m.time_s >= kFrom_s; });
   ASSERT_NE(begin, seen.end());
-  const std::vector<std::size_t> whose = nearest(world, *begin, kSimulated);
+  const auto whose = nearest(world, *begin, kSimulated);
+  if (!whose) {
+    EXPECT_GT(pace_, kSlowest) << "a tracked robot is where no robot is";
+    return;
+  }
+  judge(compare(world, seen, samples, kSimulated, *whose, kFrom_s));
+  if (!judged_) return;
   const auto end = std::find_if(seen.rbegin(), seen.rend(), [&](const Moment& m) { return world.at(m.wall_s, 0); });
   ASSERT_NE(end, seen.rend());
   EXPECT_EQ(nearest(world, *end, kSimulated), whose) << "tracked robots have exchanged their numbers";
-  expect_as_asked(compare(world, seen, samples, kSimulated, whose, kFrom_s));
 }
 
 }  // namespace

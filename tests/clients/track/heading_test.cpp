@@ -138,6 +138,28 @@ INSTANTIATE_TEST_SUITE_P(Conditions, HeadingOf,
                                          Condition{0.6, 1 / 30.0}, Condition{0.1, 1 / 30.0, 150, true},
                                          Condition{0.3, 1 / 30.0, 150, true}));
 
+/// The hypothesis that only seen headings can speak for must not run away meanwhile.
+TEST(Headings, ArePossibleAgainAfterAnHourInTheDark) {
+  constexpr double kStep_s = 0.1, kLit_s = 20, kDark_s = 3600;
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> noise(0, 1);
+  Robot robot;
+  HeadingFilter filter;
+  for (int i = 0; i * kStep_s < kDark_s + 2 * kLit_s; ++i) {
+    const double t = i * kStep_s;
+    const int turn = i / 50 % 4;  // straight, left, straight, right, 5 s each
+    robot.drive(turn == 1 ? 0 : 10, turn == 3 ? 0 : 10, kStep_s);
+    const double x = robot.centre_x() + 0.1 * noise(random), y = robot.centre_y() + 0.1 * noise(random);
+    if (t < kLit_s || t > kLit_s + kDark_s)
+      filter.update(t, x, y, 0.1, wrapped(std::remainder(robot.heading_rad, 2 * kPi) + 0.1 * noise(random)), 0.1);
+    else
+      filter.update(t, x, y, 0.1);
+  }
+  ASSERT_TRUE(filter.heading());
+  EXPECT_NEAR(std::remainder(filter.heading()->heading_rad - robot.heading_rad, 2 * kPi), 0, 0.15);
+  EXPECT_LT(filter.heading()->variance_rad2, 0.05);
+}
+
 TEST(Headings, OfARobotThatAWallHoldsAreUncertain) {
   // It drives at 60 degrees against a wall and slides along it: the path is straight, and is not its heading.
   Robot robot;
