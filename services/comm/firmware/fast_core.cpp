@@ -96,6 +96,7 @@ void FastCore::forget(std::uint32_t address, std::uint32_t octets) {
   for (std::uint32_t i = first; i < last; ++i) (*operations_)[i] = Operation();
 }
 
+// NOLINTNEXTLINE(readability-function-size): one switch over the instruction set
 FastCore::Operation FastCore::decode(std::uint32_t pc) const {
   const std::uint32_t o = word(pc), next = pc + 2;
   const auto d5 = static_cast<std::uint8_t>(o >> 4 & 31), r5 = static_cast<std::uint8_t>((o >> 5 & 16) | (o & 15));
@@ -252,6 +253,7 @@ FastCore::Operation FastCore::decode(std::uint32_t pc) const {
   }
 }
 
+// NOLINTNEXTLINE(readability-function-size): one switch over the instruction set
 std::uint64_t FastCore::run(avr_t& avr, std::uint64_t cycles) {
   std::uint8_t* const data = avr.data;
   std::uint8_t* const flag = avr.sreg;
