@@ -173,7 +173,7 @@ void RunRecorder::idle(const RunProgress& progress) {
   if (on_idle_) on_idle_(progress);
 }
 
-recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
+void RunRecorder::record_counts(const RunTotals& totals) {
   if (plan_.recording_settings().messages) {
     proto::MessagesRecord messages;
     for (const PairCount& pair : totals.pairs) {
@@ -194,9 +194,9 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
     }
     writer_.radio(radios);
   }
-  // A run that failed before the first state hash ends at its first tick.
-  writer_.end(std::max(totals.last, totals.first), totals.state_hash, totals.failure);
+}
 
+recorder::Summary RunRecorder::summary_of(const RunTotals& totals, double start_s) {
   recorder::Summary summary;
   summary.name = plan_.experiment_name();
   summary.seed = plan_.seed();
@@ -246,6 +246,15 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   costs.recording = cost(Work::kRecording);
   summary.federates = totals.federates;
   summary.provenance = recorder::read_provenance(directory_.provenance()).value_or(recorder::Provenance{});
+  return summary;
+}
+
+recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
+  record_counts(totals);
+  // A run that failed before the first state hash ends at its first tick.
+  writer_.end(std::max(totals.last, totals.first), totals.state_hash, totals.failure);
+
+  recorder::Summary summary = summary_of(totals, start_s);
   if (header_.observable_size() > 0 && any_state_) {
     recorder::Reader recording(directory_.recording());
     for (const recorder::OwnCurve& own : recorder::observe(recording).own)

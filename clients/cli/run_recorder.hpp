@@ -8,8 +8,8 @@
 
 #include "clients/cli/recorded_state.hpp"
 #include "clients/cli/run_monitor.hpp"
+#include "clients/recorder/displacement.hpp"
 #include "clients/recorder/run_directory.hpp"
-#include "clients/recorder/statistics.hpp"
 #include "clients/recorder/summary.hpp"
 #include "clients/recorder/writer.hpp"
 #include "core/federation/checkpoint.hpp"
@@ -45,6 +45,8 @@ class RunRecorder : public RunObserver {
  private:
   void take_over(const std::filesystem::path& earlier, Tick until);
   void take_event(const proto::EventRecord& event);
+  void record_counts(const RunTotals& totals);
+  [[nodiscard]] recorder::Summary summary_of(const RunTotals& totals, double start_s);
 
   const RunPlan& plan_;
   const recorder::RunDirectory directory_;

@@ -91,7 +91,7 @@ void SweepColours::add_curves(Plot& plot) const {
   for (const Colour& colour : colours_) {
     PlotSeries series = series_of(colour.name);
     series.x = colour.time_s;
-    for (const recorder::Sample& sample : colour.over_time) {
+    for (const stats::Moments& sample : colour.over_time) {
       series.y.push_back(sample.count() > 0 ? sample.mean() : std::nan(""));
       series.error.push_back(sample.standard_error());
     }

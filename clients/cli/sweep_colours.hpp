@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "clients/cli/sweep_points.hpp"
-#include "clients/recorder/statistics.hpp"
 #include "clients/report/plot.hpp"
+#include "core/stats/moments.hpp"
 
 namespace kilotwin::cli {
 
@@ -43,8 +43,8 @@ class SweepColours {
   struct Colour {
     std::string name;
     std::vector<double> time_s;
-    std::vector<recorder::Sample> over_time;    ///< per recorded state
-    std::map<double, recorder::Sample> at_end;  ///< by the value of the response field
+    std::vector<stats::Moments> over_time;    ///< per recorded state
+    std::map<double, stats::Moments> at_end;  ///< by the value of the response field
   };
   void divide(std::size_t field);
 

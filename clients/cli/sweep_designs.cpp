@@ -12,15 +12,15 @@ namespace kilotwin::cli {
 namespace {
 
 namespace fs = std::filesystem;
-using recorder::Sample;
+using stats::Moments;
 
-Sample mean_over(const std::map<std::uint64_t, double>& by_seed) {
-  Sample sample;
+Moments mean_over(const std::map<std::uint64_t, double>& by_seed) {
+  Moments sample;
   for (const auto& [seed, value] : by_seed) sample.add(value);
   return sample;
 }
 
-std::string number_pair(const Sample& sample) {
+std::string number_pair(const Moments& sample) {
   return sample.count() == 0 ? std::string(",")
                              : fmt::format("{:.10g},{:.4g}", sample.mean(), sample.standard_error());
 }
@@ -94,7 +94,7 @@ std::vector<Design> SweepDesigns::ranked() const {
     if (design.rank > 0) design.rank = ranked.size() + 1;
     for (const auto& [model, by_seed] : values->by_model) {
       const BySeed& best = all.front().second->by_model.at(model);
-      Sample differences;
+      Moments differences;
       for (const auto& [seed, value] : by_seed) {
         if (const auto other = best.find(seed); other != best.end()) differences.add(value - other->second);
       }

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "clients/cli/sweep_points.hpp"
-#include "clients/recorder/statistics.hpp"
+#include "core/stats/moments.hpp"
 
 namespace kilotwin::cli {
 
@@ -24,12 +24,12 @@ inline constexpr const char* kModelField = "model";
                                                   const std::vector<std::filesystem::path>& models);
 
 struct Design {
-  SweepPoint fields;             ///< without the model
-  recorder::Sample over_models;  ///< of the means over seeds
-  double worst = 0;              ///< of these means
-  std::string worst_model;       ///< where that is
-  recorder::Sample to_best;  ///< per model: mean over common seeds of the value less that of the design of rank 1
-  std::size_t rank = 0;      ///< by `worst`, from 1; 0: it has no value with some model
+  SweepPoint fields;           ///< without the model
+  stats::Moments over_models;  ///< of the means over seeds
+  double worst = 0;            ///< of these means
+  std::string worst_model;     ///< where that is
+  stats::Moments to_best;      ///< per model: mean over common seeds of the value less that of the design of rank 1
+  std::size_t rank = 0;        ///< by `worst`, from 1; 0: it has no value with some model
 };
 
 class SweepDesigns {

@@ -20,10 +20,10 @@ namespace kilotwin::cli {
 namespace {
 
 using recorder::kObservables;
-using recorder::Sample;
+using stats::Moments;
 
 /// Two CSV columns, mean and standard error; both empty without a value.
-std::string csv_pair(const Sample& sample) {
+std::string csv_pair(const Moments& sample) {
   if (sample.count() == 0) return ",,";
   return fmt::format(",{:.10g},{:.4g}", sample.mean(), sample.standard_error());
 }
@@ -313,8 +313,8 @@ std::string SweepReport::table_csv() const {
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Observed& at = observed_[i];
     csv += fmt::format("{},{}", csv_cell(name_of(i)), at.realtime.count());
-    for (const Sample& sample : at.at_end.empty() ? none : at.at_end) csv += csv_pair(sample);
-    for (const Sample* sample : {&at.sent, &at.received, &at.collided}) csv += csv_pair(*sample);
+    for (const Moments& sample : at.at_end.empty() ? none : at.at_end) csv += csv_pair(sample);
+    for (const Moments* sample : {&at.sent, &at.received, &at.collided}) csv += csv_pair(*sample);
     csv += fmt::format(",{:.6g},{:.6g}{}\n", at.failed.mean(), at.realtime.mean(), fields_of(i));
   }
   return csv;
@@ -351,7 +351,7 @@ std::string SweepReport::curves_csv() const {
     const std::string point = csv_cell(name_of(i));
     for (std::size_t k = 0; k < at.over_time.size(); ++k) {
       csv += fmt::format("{},{:.10g},{}", point, at.time_s[k], at.over_time[k][0].count());
-      for (const Sample& sample : at.over_time[k]) csv += csv_pair(sample);
+      for (const Moments& sample : at.over_time[k]) csv += csv_pair(sample);
       csv += '\n';
     }
   }
@@ -414,7 +414,7 @@ Plot SweepReport::curves() const {
     series.name = short_name_of(i);
     series.x = at.time_s;
     for (const Samples& samples : at.over_time) {
-      const Sample& sample = samples[plotted()];
+      const Moments& sample = samples[plotted()];
       series.y.push_back(sample.count() > 0 ? sample.mean() : std::nan(""));
       series.error.push_back(sample.standard_error());
     }
@@ -440,7 +440,7 @@ Plot SweepReport::response() const {
   }
   std::vector<std::string> names;
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    const Sample sample = observed_[i].at_end.empty() ? Sample() : observed_[i].at_end[plotted()];
+    const Moments sample = observed_[i].at_end.empty() ? Moments() : observed_[i].at_end[plotted()];
     SweepPoint others;
     for (const std::size_t field : varying_) {
       if (field != response_field_) others.push_back(points_[i][field]);

@@ -12,8 +12,8 @@
 #include "clients/cli/sweep_points.hpp"
 #include "clients/recorder/observables.hpp"
 #include "clients/recorder/provenance.hpp"
-#include "clients/recorder/statistics.hpp"
 #include "clients/report/plot.hpp"
+#include "core/stats/moments.hpp"
 
 namespace kilotwin::cli {
 
@@ -72,13 +72,13 @@ class SweepReport {
  private:
   static constexpr std::size_t most_fields_ = static_cast<std::size_t>(-1);
   /// Per observable: those of observables.hpp, then the experiment's.
-  using Samples = std::vector<recorder::Sample>;
+  using Samples = std::vector<stats::Moments>;
 
   struct Observed {
     Samples at_end;
     std::vector<Samples> over_time;  // per recorded state
     std::vector<double> time_s;
-    recorder::Sample sent, received, collided, failed, realtime;
+    stats::Moments sent, received, collided, failed, realtime;
   };
 
   [[nodiscard]] std::vector<std::vector<std::string>> rows() const;

@@ -7,7 +7,7 @@
 
 namespace kilotwin::cli {
 
-std::string with_error(const recorder::Sample& sample) {
+std::string with_error(const stats::Moments& sample) {
   if (sample.count() == 0) return "-";
   if (sample.count() == 1) return fmt::format("{:.5g}", sample.mean());
   return fmt::format("{:.5g} ±{:.2g}", sample.mean(), sample.standard_error());

@@ -9,11 +9,11 @@
 
 #include "clients/recorder/export.hpp"
 #include "clients/recorder/ordered_records.hpp"
-#include "clients/recorder/statistics.hpp"
 #include "clients/recorder/swarm_observables.hpp"
 #include "clients/recorder/variables_until.hpp"
 #include "core/base/error.hpp"
 #include "core/math/elementary.h"
+#include "core/stats/moments.hpp"
 
 namespace kilotwin::recorder {
 
@@ -38,7 +38,7 @@ double mean_nearest_distance_mm(std::span<const double> x_mm, std::span<const do
     return column_a != column_b ? column_a < column_b : y_mm[a] != y_mm[b] ? y_mm[a] < y_mm[b] : a < b;
   });
 
-  Sample nearest;
+  stats::Moments nearest;
   for (std::size_t robot = 0; robot < robots; ++robot) {
     double best = std::numeric_limits<double>::infinity();  // squared
     const double x = x_mm[robot], y = y_mm[robot];
@@ -79,7 +79,7 @@ void ObservableObserver::add(double time_s, std::span<const double> x_mm, std::s
   }
   const std::size_t robots = start_x_mm_.size();
   KILOTWIN_DEMAND(x_mm.size() == robots && y_mm.size() == robots && heading_rad.size() == robots);
-  Sample square, distance, x, y, cosine, sine;
+  stats::Moments square, distance, x, y, cosine, sine;
   for (std::size_t i = 0; i < robots; ++i) {
     const double dx = x_mm[i] - start_x_mm_[i], dy = y_mm[i] - start_y_mm_[i];
     square.add(dx * dx + dy * dy);
@@ -91,12 +91,12 @@ void ObservableObserver::add(double time_s, std::span<const double> x_mm, std::s
     cosine.add(c);
     sine.add(s);
   }
-  Sample from_centroid;
+  stats::Moments from_centroid;
   for (std::size_t i = 0; i < robots; ++i) {
     const double dx = x_mm[i] - x.mean(), dy = y_mm[i] - y.mean();
     from_centroid.add(dx * dx + dy * dy);
   }
-  Sample pushed;
+  stats::Moments pushed;
   KILOTWIN_DEMAND(movable_x_mm.size() == movable_start_x_mm_.size() && movable_y_mm.size() == movable_x_mm.size());
   for (std::size_t i = 0; i < movable_x_mm.size(); ++i) {
     const double dx = movable_x_mm[i] - movable_start_x_mm_[i], dy = movable_y_mm[i] - movable_start_y_mm_[i];

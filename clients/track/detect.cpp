@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "clients/track/radial_votes.hpp"
+#include "core/stats/quantiles.hpp"
 
 namespace kilotwin::track {
 namespace {
@@ -27,12 +28,6 @@ constexpr double kTogether_px = 52;
 constexpr double kLeastDistance = 1.8;
 
 double distance(const Point& a, const Point& b) { return std::hypot(a.x_px - b.x_px, a.y_px - b.y_px); }
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// How strongly a circle speaks for a robot.
 double strength(const FittedCircle& circle) {
@@ -89,7 +84,7 @@ std::optional<double> common_radius(const cv::Mat& grey) {
     }
     if (evidence > best && !radii.empty()) {
       best = evidence;
-      radius = median(radii);
+      radius = stats::upper_median(radii);
     }
   }
   return radius;
@@ -226,7 +221,7 @@ std::vector<Detection> Detector::find(const cv::Mat& grey) {
     radii.push_back(circle.circle.radius_px);
   }
   if (contrasts.empty()) return {};
-  const Look look{median(radii), median(contrasts)};
+  const Look look{stats::upper_median(radii), stats::upper_median(contrasts)};
   const auto unlike = [&](const FittedCircle& c) {
     return c.contrast < kLeastContrast * look.contrast ||
            std::abs(c.circle.radius_px - look.radius_px) > kRadiusSpread * look.radius_px;

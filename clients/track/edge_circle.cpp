@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "clients/track/brightness.hpp"
+#include "core/stats/quantiles.hpp"
 
 namespace kilotwin::track {
 namespace {
@@ -141,10 +142,8 @@ Circle improved(const Circle& circle, const std::array<EdgePoint, kRays>& points
           std::abs(std::hypot(p.at.x_px - circle.centre.x_px, p.at.y_px - circle.centre.y_px) - circle.radius_px));
   }
   if (distances.size() < 8) return circle;
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
   // Tukey's weights, scaled by the median distance.
-  const double bound = std::max(4.0 * 1.4826 * *middle, 0.02 * circle.radius_px + 0.2);
+  const double bound = std::max(4.0 * 1.4826 * stats::upper_median(distances), 0.02 * circle.radius_px + 0.2);
   cv::Matx33d normal = cv::Matx33d::zeros();
   cv::Vec3d right(0, 0, 0);
   for (const EdgePoint& p : points) {
@@ -190,9 +189,7 @@ void mark_hidden(std::array<EdgePoint, kRays>& points, const Patch& patch, const
       most = std::max(most, patch.at(circle.centre.x_px + at * r * ray.cos, circle.centre.y_px + at * r * ray.sin));
     rim[i] = most;
   }
-  std::array<float, kRays> sorted = outside;
-  std::nth_element(sorted.begin(), sorted.begin() + kRays / 2, sorted.end());
-  const float floor = sorted[kRays / 2];
+  const float floor = stats::upper_median(std::vector<float>(outside.begin(), outside.end()));
   int bright = 0;
   for (std::size_t i = 0; i < kRays; ++i) {
     points[i].hidden = rim[i] > floor + 0.08F;
@@ -258,9 +255,7 @@ std::optional<FittedCircle> fit_circle(const cv::Mat& grey, const Circle& guess,
   fitted.coverage = static_cast<double>(rises.size()) / std::max(visible, kRays / 2);
   fitted.spread = spread_of(directions);
   fitted.residual_px = std::sqrt(squares / static_cast<double>(rises.size()));
-  const auto middle = rises.begin() + static_cast<std::ptrdiff_t>(rises.size() / 2);
-  std::nth_element(rises.begin(), middle, rises.end());
-  fitted.contrast = *middle;
+  fitted.contrast = stats::upper_median(rises);
   return fitted;
 }
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <iterator>
 
+#include "core/stats/quantiles.hpp"
+
 namespace kilotwin::track {
 namespace {
 
@@ -73,9 +75,7 @@ Colour floor_around(const cv::Mat& picture, const Circle& disc, const std::vecto
   for (std::size_t k = 0; k < 3; ++k) {
     // Crowded: the brightest of what there is was hardly a robot.
     if (seen[k].empty()) return {160, 160, 160};
-    const auto middle = seen[k].begin() + static_cast<std::ptrdiff_t>(seen[k].size() / 2);
-    std::nth_element(seen[k].begin(), middle, seen[k].end());
-    floor[k] = std::max(12.0, *middle);
+    floor[k] = std::max(12.0, stats::upper_median(std::move(seen[k])));
   }
   return floor;
 }

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "clients/track/brightness.hpp"
+#include "core/stats/quantiles.hpp"
 
 namespace kilotwin::track {
 namespace {
@@ -20,10 +21,7 @@ float median_of(const cv::Mat& values) {
     const float* line = values.ptr<float>(row);
     for (int column = row % 5; column < values.cols; column += 5) some.push_back(line[column]);
   }
-  if (some.empty()) return 0;
-  const auto middle = some.begin() + static_cast<std::ptrdiff_t>(some.size() / 2);
-  std::nth_element(some.begin(), middle, some.end());
-  return *middle;
+  return stats::upper_median(std::move(some));
 }
 
 /// Whether the slope at a pixel is the steepest along its direction.

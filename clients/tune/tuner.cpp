@@ -11,6 +11,8 @@
 #include <random>
 #include <utility>
 
+#include "core/stats/moments.hpp"
+
 namespace kilotwin::tune {
 namespace {
 
@@ -141,17 +143,13 @@ std::size_t least_budget(const Settings& s) { return check_of(s) + 2 * populatio
 Seeds last_seeds(const Settings& s) { return {again_seed(s) + kAgain * s.seeds, kLast * s.seeds}; }
 
 Estimate estimate(const std::vector<double>& values) {
+  stats::Moments finite;
+  for (const double value : values)
+    if (std::isfinite(value)) finite.add(value);
   Estimate e;
-  double squares = 0;
-  for (const double value : values) {
-    if (!std::isfinite(value)) continue;
-    ++e.count;
-    const double from_mean = value - e.mean;
-    e.mean += from_mean / static_cast<double>(e.count);
-    squares += from_mean * (value - e.mean);
-  }
-  if (e.count > 1)
-    e.standard_error = std::sqrt(squares / static_cast<double>(e.count - 1) / static_cast<double>(e.count));
+  e.count = finite.count();
+  e.mean = finite.mean();
+  e.standard_error = finite.standard_error();
   return e;
 }
 

@@ -1,7 +1,9 @@
 /// Curves over time, and what the page is told of them, as JSON.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +12,12 @@ namespace kilotwin::view {
 
 /// A curve has so many points at most.
 inline constexpr std::size_t kMostPoints = 1000;
+/// One answer reads a recording for so long at most, because all viewers wait for it.
+inline constexpr std::chrono::milliseconds kReadFor{40};
+/// Variables and events reach the recording at most so many ticks after the newest one, and some more.
+inline constexpr std::int64_t kSettled_ticks = 128;
+/// A value that does not exist.
+inline constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 
 struct Curves {
   std::vector<double> time_s;

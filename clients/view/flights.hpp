@@ -19,6 +19,8 @@ namespace view {
 
 /// Flights of one answer at most; of more, the newest count.
 inline constexpr std::size_t kMostFlights = 1500;
+/// Robots that were heard within this time have a line to the one that heard them.
+inline constexpr double kLately_s = 3;
 
 struct Flight {
   double tick = 0;                         ///< when the packet ended, not whole

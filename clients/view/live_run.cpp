@@ -29,8 +29,6 @@ constexpr std::size_t kMostTrackers = 16;
 /// A run that is so many times faster than real time shows fewer states.
 constexpr double kFast = 8;
 constexpr auto kBetweenStatesOfAFastRun = 50ms;
-/// Robots that were heard within this time count as heard lately.
-constexpr double kLately_s = 3;
 /// Messages are read for so long after a viewer has asked for them.
 constexpr auto kFlightsWanted = 2s;
 

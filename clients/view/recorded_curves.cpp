@@ -18,8 +18,6 @@ using namespace std::chrono_literals;
 
 /// What one curve may read of the file, and the octets per robot of a state and of the value of a variable.
 constexpr std::size_t kCurveBytes = 48'000'000, kStateBytesPerRobot = 26, kValueBytesPerRobot = 6;
-/// One answer reads states for so long at most, because all viewers wait for it.
-constexpr auto kReadFor = 40ms;
 /// Of a recording that grows, an answer is given again for so long.
 constexpr auto kAnswerHolds = 1s;
 constexpr std::size_t kMostAnswers = 64;
@@ -27,10 +25,7 @@ constexpr std::size_t kMostAnswers = 64;
 constexpr std::size_t kMostRecordsPerAnswer = 4000;
 /// Curves of which it is remembered what was read. More than viewers that look at different robots at once, as a rule.
 constexpr std::size_t kMostEventCounts = 32, kMostKnownPoints = 64;
-/// Variables and events reach the recording at most so many ticks after the newest one, and some more.
-constexpr std::int64_t kSettled_ticks = 128;
 constexpr std::int64_t kEver = std::numeric_limits<std::int64_t>::max();
-constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 
 struct EventPlot {
   proto::RecordedEvent kind;

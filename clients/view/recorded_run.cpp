@@ -28,8 +28,6 @@ using recorder::StateIndex;
 
 /// A place that a tracker stated is shown for so long. Records that one answer reads at most.
 constexpr double kPlaceHolds_s = 1;
-/// Robots that were heard within this time have a line to the one that heard them.
-constexpr double kLately_s = 3;
 constexpr std::size_t kMostSamples = 128;
 /// Inputs that one answer reads at most, and marks of a time line.
 constexpr std::size_t kMostInputs = 4000, kMostMarks = 500;

@@ -9,11 +9,9 @@
 namespace kilotwin::view {
 namespace {
 
-using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
-constexpr auto kReadFor = 40ms;
+
 constexpr std::size_t kColumns = 9;  // as clients/monitor/residuals.cpp writes them
-constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 
 /// NaN where a column is empty or no number.
 std::array<double, kColumns> numbers_of(const std::string& row) {

@@ -5,21 +5,18 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "clients/view/curves.hpp"
 #include "clients/view/recently_used.hpp"
 
 namespace kilotwin::view {
 namespace {
 
-using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 using recorder::StateIndex;
 
-constexpr auto kReadFor = 40ms;
 constexpr std::size_t kMostRobots = 16;
 /// Pairs of robots that are listed for one robot.
 constexpr std::size_t kMostPartners = 8;
-/// Events reach the recording at most so many ticks after the newest one.
-constexpr std::int64_t kSettled_ticks = 128;
 
 }  // namespace
 

@@ -146,6 +146,15 @@ void Covariates::fill(Column& column, Tick now, const RobotColumns& robots, std:
     for (std::size_t i = 0; i < count; ++i) to[i] = value(std::size_t{who[i]});
   };
   const auto remembered = [&] { each([&](std::size_t r) { return robots.memory[r * stride + column.slot]; }); };
+  // The remembered value, unless the command changes at this tick.
+  const auto unless_changed = [&](auto&& otherwise) {
+    const std::uint32_t command = plan_.memory.index_of({Kind::kCommand});
+    each([&](std::size_t r) {
+      const double* const memory = robots.memory.data() + r * stride;
+      return memory[command] == static_cast<double>(command_of(robots.duties[r])) ? memory[column.slot]
+                                                                                  : otherwise(memory, command);
+    });
+  };
   switch (column.covariate) {
     case Covariate::kTime:
       return each([time_s = plan_.tick_length.seconds_at(now)](std::size_t) { return time_s; });
@@ -160,29 +169,12 @@ void Covariates::fill(Column& column, Tick now, const RobotColumns& robots, std:
       return each([&](std::size_t r) { return static_cast<double>(command_of(robots.duties[r])); });
     case Covariate::kLeftDuty: return each([&](std::size_t r) { return double{1} * robots.duties[r].left; });
     case Covariate::kRightDuty: return each([&](std::size_t r) { return double{1} * robots.duties[r].right; });
-    case Covariate::kTimeSinceCommand: {
-      const std::uint32_t command = plan_.memory.index_of({Kind::kCommand});
-      return each([&](std::size_t r) {
-        const double* const memory = robots.memory.data() + r * stride;
-        return memory[command] == static_cast<double>(command_of(robots.duties[r])) ? memory[column.slot] : 0.0;
-      });
-    }
-    case Covariate::kPreviousCommand: {
-      const std::uint32_t command = plan_.memory.index_of({Kind::kCommand});
-      return each([&](std::size_t r) {
-        const double* const memory = robots.memory.data() + r * stride;
-        return memory[command] == static_cast<double>(command_of(robots.duties[r])) ? memory[column.slot]
-                                                                                    : memory[command];
-      });
-    }
+    case Covariate::kTimeSinceCommand: return unless_changed([](const double*, std::uint32_t) { return 0.0; });
+    case Covariate::kPreviousCommand:
+      return unless_changed([](const double* memory, std::uint32_t command) { return memory[command]; });
     case Covariate::kPreviousLasted: {
-      const std::uint32_t command = plan_.memory.index_of({Kind::kCommand}),
-                          time = plan_.memory.index_of({Kind::kTimeSinceCommand});
-      return each([&](std::size_t r) {
-        const double* const memory = robots.memory.data() + r * stride;
-        return memory[command] == static_cast<double>(command_of(robots.duties[r])) ? memory[column.slot]
-                                                                                    : memory[time];
-      });
+      const std::uint32_t time = plan_.memory.index_of({Kind::kTimeSinceCommand});
+      return unless_changed([time](const double* memory, std::uint32_t) { return memory[time]; });
     }
     case Covariate::kSinceRest:
       return each(

@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
+#include <boost/math/policies/policy.hpp>
 #include <boost/math/special_functions/gamma.hpp>
 
 namespace kilotwin::stats {
 
 double chi_squared_tail(double x, double degrees) {
-  return boost::math::gamma_q(degrees / 2, std::max(x, 0.0) / 2);
+  // In double precision, not long double: 5 times as fast, with errors of some 1e-15.
+  using InDouble = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
+  return boost::math::gamma_q(degrees / 2, std::max(x, 0.0) / 2, InDouble());
 }
 
 /// By the continued fraction of the incomplete gamma function in its tail, in logarithms: gamma_q() underflows there.

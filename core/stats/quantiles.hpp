@@ -22,14 +22,20 @@ template <class T> [[nodiscard]] T upper_end(std::vector<T>& values, std::size_t
 }
 
 /// The upper median: of an even number of values the greater of the two in the middle; 0 of none.
-[[nodiscard]] inline double upper_median(std::vector<double> values) {
-  return values.empty() ? 0 : order_statistic(values, values.size() / 2);
+template <class T> [[nodiscard]] T upper_median(std::vector<T> values) {
+  return values.empty() ? T{0} : order_statistic(values, values.size() / 2);
 }
 
 /// The observed value at or below the quantile of `share`, 0..1; 0 of none. Reorders the values.
 [[nodiscard]] inline double lower_quantile(std::vector<double>& values, double share) {
   if (values.empty()) return 0;
   return order_statistic(values, static_cast<std::size_t>(share * static_cast<double>(values.size() - 1)));
+}
+
+/// The observed value nearest to the quantile of `share`, 0..1; 0 of none. Reorders the values.
+[[nodiscard]] inline double nearest_quantile(std::vector<double>& values, double share) {
+  if (values.empty()) return 0;
+  return order_statistic(values, static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5));
 }
 
 /// The quantile with linear interpolation between observed values (type 7 of Hyndman and Fan, 1996; numpy's default). NaN

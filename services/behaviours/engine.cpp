@@ -297,6 +297,7 @@ void BehavioursEngine::use_battery(std::uint32_t i) {
   holds_[i] = offers_[i] = 0;
 }
 
+// NOLINTNEXTLINE(readability-function-size): the steps of one tick, in their order
 void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_ticks, const Program& program,
                                  const Slot& slot, const Executor& executor) {
   spin_up_[i] = 0;

@@ -97,6 +97,7 @@ template <> struct ContactValues<0> {
 
 /// `kCount`: number of contacts of a batch that is not special; 0: read the number from the batch.
 template <bool kWithOverlaps, std::size_t kCount>
+// NOLINTNEXTLINE(readability-function-size): one loop, whose values stay in registers
 inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* contacts,
                  const SpecialLanes* specials, const double* motion, double* after, double* room_mm) {
   const std::size_t count = kCount > 0 ? kCount : batch.used;

@@ -9,9 +9,9 @@
 #include <cmath>
 
 #include "clients/recorder/reader.hpp"
-#include "clients/recorder/statistics.hpp"
 #include "core/base/error.hpp"
 #include "core/os/files.hpp"
+#include "core/stats/moments.hpp"
 
 namespace kilotwin::validation {
 
@@ -114,7 +114,7 @@ std::vector<Recorded> Runs::sweep(const std::string& experiment, const std::vect
 }
 
 Figure mean_of(const std::vector<double>& values) {
-  recorder::Sample sample;
+  stats::Moments sample;
   for (const double value : values) sample.add(value);
   return {sample.mean(), sample.standard_error()};
 }

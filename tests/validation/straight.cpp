@@ -3,8 +3,8 @@
 #include <array>
 #include <cmath>
 
-#include "clients/recorder/statistics.hpp"
 #include "clients/report/plot.hpp"
+#include "core/stats/moments.hpp"
 #include "tests/validation/reference.hpp"
 #include "tests/validation/straight_theory.hpp"
 #include "tests/validation/validations.hpp"
@@ -26,9 +26,9 @@ void validate_bias(Runs& runs, Verdicts& verdicts, Effort effort) {
   const std::vector<Recorded> swarms =
       runs.sweep(runs.source("experiments/straight.txtpb"),
                  {"--robots", "120", "--duration", "62", "--seeds", seeds(effort.quick ? 2 : 20)});
-  recorder::Sample all, deviation, mean;
+  stats::Moments all, deviation, mean;
   for (const Recorded& run : swarms) {
-    recorder::Sample biases;
+    stats::Moments biases;
     for (std::size_t i = 0; i < run.robots(); ++i) {
       const WheelBias bias = estimate_bias(run.track(i, kFirstState), model, 10, 6);
       biases.add(bias.left_mm_s);
@@ -55,7 +55,7 @@ void validate_straight(Runs& runs, Verdicts& verdicts, Effort effort) {
   const std::vector<Recorded> swarms = runs.sweep(runs.source("experiments/straight.txtpb"),
                                                   {"--duration", "62", "--seeds", seeds(effort.quick ? 1 : 10)});
   const auto measured_at = [&](double time_s, double& exact_s) {
-    recorder::Sample robots;  // they are independent, whichever run they are of
+    stats::Moments robots;  // they are independent, whichever run they are of
     for (const Recorded& run : swarms) {
       const std::size_t at = run.state_at(run.time_s[kFirstState] + time_s);
       exact_s = run.time_s[at] - run.time_s[kFirstState];

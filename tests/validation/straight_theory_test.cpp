@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "clients/recorder/statistics.hpp"
+#include "core/stats/moments.hpp"
 
 namespace kilotwin::validation {
 namespace {
@@ -24,7 +24,7 @@ TEST(StraightTheory, ClosedFormIsTheMeanOverManyRobots) {
   std::mt19937_64 generator(3);
   std::normal_distribution<double> bias(model.bias_mean_mm_s, model.bias_sd_mm_s);
   for (const double time_s : {0.5, 10.0, 60.0, 600.0}) {
-    recorder::Sample squares;
+    stats::Moments squares;
     for (int i = 0; i < 200'000; ++i) {
       double x = 0, y = 0, heading = 0;
       centre_at(model, {bias(generator), bias(generator)}, time_s, x, y, heading);

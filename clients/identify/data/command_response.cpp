@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/stats/quantiles.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -16,14 +18,9 @@ constexpr double kMostSds = 3.5;
 
 /// Median, and the standard deviation estimated by the median absolute deviation.
 template <class Spread> Spread spread_of(std::vector<double> values, double least_sd) {
-  const auto middle = [&] {
-    const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), at, values.end());
-    return *at;
-  };
-  const double centre = middle();
+  const double centre = stats::upper_median(values);
   for (double& v : values) v = std::abs(v - centre);
-  return {centre, std::max(1.4826 * middle(), least_sd)};
+  return {centre, std::max(1.4826 * stats::upper_median(values), least_sd)};
 }
 
 }  // namespace

@@ -219,10 +219,8 @@ void exclude_outliers(MeasuredSet& set, std::vector<DataFault>& faults) {
     // Sampled more slowly, a robot's path between two samples is unknown: no position is an outlier.
     if (course.size() < 20 || speeds.empty()) continue;
     // The length of a two-dimensional normal vector has a median of 1.18 standard deviations.
-    const auto fast = speeds.begin() + static_cast<std::ptrdiff_t>(speeds.size() * 19 / 20);
-    std::nth_element(speeds.begin(), fast, speeds.end());
     const Bounds bounds{std::max(kOutlierSds * stats::upper_median(course) / 1.18, kLeastOutlier_mm),
-                        kTooFast * *fast};
+                        kTooFast * stats::order_statistic(speeds, speeds.size() * 19 / 20)};
     DataFault fault{DataFault::Kind::kOutliers,
                     run.name,
                     std::nullopt,

@@ -7,6 +7,7 @@
 
 #include "clients/identify/fit/fitter.hpp"
 #include "clients/identify/fit/wall_detection.hpp"
+#include "core/stats/quantiles.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -86,9 +87,7 @@ void Fitter::fit_walls(FitState& state) const {
     for (const TrackView& view : state.tracks.views())
       for (const Sample& s : view.track->samples) places.push_back(side.sign * place_of(view, s).*side.along);
     if (places.size() < 100) return;
-    const std::size_t rank = places.size() - 1 - std::max<std::size_t>(3, places.size() / 2000);
-    std::nth_element(places.begin(), places.begin() + static_cast<std::ptrdiff_t>(rank), places.end());
-    const double edge = places[rank];
+    const double edge = stats::upper_end(places, std::max<std::size_t>(3, places.size() / 2000));
     // Whichever way a robot points, its disc centre was at least here.
     reached.*side.wall = side.sign * (edge - reach);
     // Tracks that came near the side, at most kMost.

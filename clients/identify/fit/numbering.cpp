@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/stats/resampling.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -84,9 +86,12 @@ Numbering numbering_of(const Fitter& fitter, const FitState& base) {
   int as_good = 0;
   for (int trial = 0; trial < kTrials; ++trial) {
     std::vector<TrackBias> drawn = tracks;
-    for (const auto& [run, members] : runs)
-      for (std::size_t i = members.size(); i > 1; --i)
-        std::swap(drawn[members[i - 1]].robot, drawn[members[engine() % i]].robot);
+    for (const auto& entry : runs) {
+      const std::vector<std::size_t>& members = entry.second;
+      stats::permute(
+          members.size(), [&](std::size_t n) { return engine() % n; },
+          [&](std::size_t i, std::size_t j) { std::swap(drawn[members[i]].robot, drawn[members[j]].robot); });
+    }
     as_good += within(drawn) <= own ? 1 : 0;
   }
   out.chance = static_cast<double>(as_good) / kTrials;

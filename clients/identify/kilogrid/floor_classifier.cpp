@@ -7,6 +7,8 @@
 #include <tuple>
 
 #include "clients/identify/kilogrid/floor_program.hpp"
+#include "core/stats/moments.hpp"
+#include "core/stats/resampling.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
@@ -170,9 +172,7 @@ class Judgement {
   [[nodiscard]] double area() const { return area(std::vector<double>(robots_, 1)); }
   /// One bootstrap sample over robots.
   [[nodiscard]] double area(Dice& dice) const {
-    std::vector<double> weight(robots_, 0);
-    for (std::size_t i = 0; i < robots_; ++i) ++weight[dice.bits() % robots_];
-    return area(weight);
+    return area(stats::bootstrap_weights(robots_, [&](std::size_t) { return dice.bits() % robots_; }));
   }
 
  private:
@@ -204,15 +204,15 @@ class Judgement {
 std::pair<double, double> area_of(const std::vector<Judgement>& halves) {
   constexpr int kResamples = 200;
   Dice dice(1);
-  double mean = 0, sum = 0, squares = 0;
+  double mean = 0;
+  stats::Moments resampled;
   for (const Judgement& half : halves) mean += half.area() / static_cast<double>(halves.size());
   for (int i = 0; i < kResamples; ++i) {
     double area = 0;
     for (const Judgement& half : halves) area += half.area(dice) / static_cast<double>(halves.size());
-    sum += area;
-    squares += area * area;
+    resampled.add(area);
   }
-  return {mean, std::sqrt(std::max(squares - sum * sum / kResamples, 0.0) / (kResamples - 1))};
+  return {mean, resampled.standard_deviation()};
 }
 
 }  // namespace

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/stats/distributions.hpp"
+
 namespace kilotwin::kilogrid {
 namespace {
 
@@ -14,18 +16,6 @@ constexpr double kOwnShare = 0.5;
 /// Robust weights: deviations beyond this many tolerances count less, since no parameter may reach such a
 /// statistic.
 constexpr double kFar = 6;
-
-/// Upper tail of chi squared with n degrees of freedom.
-double beyond(std::size_t n, double x) {
-  // Recursion upwards in steps of two from one or two degrees of freedom.
-  double tail = n % 2 == 1 ? std::erfc(std::sqrt(x / 2)) : std::exp(-x / 2);
-  double term = n % 2 == 1 ? std::sqrt(2 * x / 3.141592653589793) * std::exp(-x / 2) : x / 2 * std::exp(-x / 2);
-  for (std::size_t k = n % 2 == 1 ? 1 : 2; k < n; k += 2) {
-    tail += term;
-    term *= x / static_cast<double>(k + 2);
-  }
-  return tail;
-}
 
 /// Each robot's contribution to the deviations of a set's statistics, normalised to sum of squares 1.
 Eigen::MatrixXd parts_of(const FloorSet& set) {
@@ -168,7 +158,7 @@ double NullDistribution::evidence(std::size_t candidate, double gain) const {
   if (!(gain > 0)) return 0;
   constexpr double kFarOut = 600;  // there the asymptotic form holds
   const double x = gain / scale_[candidate];
-  return x > kFarOut ? x / 2 : -std::log(beyond(switches_[candidate], x));
+  return x > kFarOut ? x / 2 : -std::log(stats::chi_squared_tail(x, static_cast<double>(switches_[candidate])));
 }
 
 double NullDistribution::gain_of(std::size_t candidate, double of) const {

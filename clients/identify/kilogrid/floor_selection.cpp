@@ -12,6 +12,8 @@
 
 #include "clients/identify/kilogrid/floor_evidence.hpp"
 #include "core/os/worker_pool.hpp"
+#include "core/stats/distributions.hpp"
+#include "core/stats/moments.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
@@ -136,18 +138,15 @@ bool CandidateScore::helps_held_out() const {
 }
 
 bool CandidateScore::consistent_over_runs() const {
-  // One-sided 1 % quantiles of Student's t for 2 to 9 degrees of freedom; more use the last.
-  constexpr std::array kStudent = {6.965, 4.541, 3.747, 3.365, 3.143, 2.998, 2.896, 2.821};
   if (by_run.size() < 3) return false;
-  const auto count = static_cast<double>(by_run.size());
-  const double mean = std::accumulate(by_run.begin(), by_run.end(), 0.0) / count;
-  double squares = 0;
-  for (const double removed : by_run) {
-    if (!(removed > 0)) return false;
-    squares += (removed - mean) * (removed - mean);
+  stats::Moments removed;
+  for (const double of_run : by_run) {
+    if (!(of_run > 0)) return false;
+    removed.add(of_run);
   }
-  return mean >
-         kStudent[std::min(by_run.size() - 3, kStudent.size() - 1)] * std::sqrt(squares / (count - 1) / count);
+  constexpr double kLevel = 0.01;  // one-sided, Student's t
+  return removed.mean() >
+         stats::student_quantile(1 - kLevel, static_cast<double>(by_run.size() - 1)) * removed.standard_error();
 }
 
 Selection choose(const FloorModel& model, const std::vector<FloorTerm>& candidates, const FloorTarget& target,

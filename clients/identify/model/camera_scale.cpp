@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/stats/distributions.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -19,8 +21,6 @@ constexpr double kMade_mm = 0.3;
 /// Sampling interval of pairs.
 constexpr double kEvery_s = 0.5;
 
-double below(double z) { return 0.5 * std::erfc(-z * M_SQRT1_2); }
-
 /// Probability of each histogram bin: a mixture of robots that pass each other, none nearer than `edge`, and
 /// robots in contact.
 struct Shares {
@@ -29,8 +29,9 @@ struct Shares {
     double all = 0, near = 0;
     for (std::size_t i = 0; i < kBins; ++i) {
       const double low = kLow_mm + kBin_mm * static_cast<double>(i), d = low + kBin_mm / 2;
-      all += passing[i] = d * below((d - edge_mm) / sd_mm);
-      near += staying[i] = below((low + kBin_mm - edge_mm) / sd_mm) - below((low - edge_mm) / sd_mm);
+      all += passing[i] = d * stats::normal_cdf((d - edge_mm) / sd_mm);
+      near += staying[i] =
+          stats::normal_cdf((low + kBin_mm - edge_mm) / sd_mm) - stats::normal_cdf((low - edge_mm) / sd_mm);
     }
     for (std::size_t i = 0; i < kBins; ++i) {
       passing[i] /= all;

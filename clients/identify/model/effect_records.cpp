@@ -110,6 +110,68 @@ void set_spline(Function& function, const Factor& factor, const Eigen::VectorXd&
   }
 }
 
+void set_harmonic(Function& function, double cosine, double sine, double period) {
+  proto::Harmonic& harmonic = *function.mutable_harmonic();
+  harmonic.set_cosine(rounded(cosine));
+  harmonic.set_sine(rounded(sine));
+  harmonic.set_period(period);
+}
+
+void set_table(Function& function, const Factor& factor, const Eigen::VectorXd& coefficients) {
+  proto::Table& table = *function.mutable_table();
+  for (std::size_t i = 0; i < factor.points.size(); ++i) {
+    if (factor.axis.of == Covariate::kPreviousCommand && factor.points[i] == kNoCommand) continue;
+    table.add_key(static_cast<std::uint32_t>(factor.points[i]));
+    table.add_value(rounded(factor.plus + coefficients[static_cast<Eigen::Index>(i)]));
+  }
+  if (factor.plus != 0) table.set_otherwise(rounded(factor.plus));
+}
+
+void set_steps(Function& function, const Factor& factor, const Eigen::VectorXd& coefficients) {
+  proto::Steps& steps = *function.mutable_steps();
+  double value = 0;
+  steps.add_value(0);
+  for (std::size_t i = 0; i < factor.points.size(); ++i) {
+    if (coefficients[static_cast<Eigen::Index>(i)] == 0) continue;
+    value += coefficients[static_cast<Eigen::Index>(i)];
+    steps.add_at(rounded(factor.points[i]));
+    steps.add_value(rounded(value));
+  }
+}
+
+/// One curve that decays to 0 or levels off from 0; several as a spline.
+void set_exponential(Function& function, const Factor& factor, const Eigen::VectorXd& coefficients) {
+  if (factor.points.size() == 1) {
+    proto::Exponential& exponential = *function.mutable_exponential();
+    if (factor.shape == Shape::kExponential)
+      exponential.set_at_zero(rounded(coefficients[0]));
+    else
+      exponential.set_at_infinity(rounded(coefficients[0]));
+    exponential.set_scale(factor.points[0]);
+    return;
+  }
+  const double slowest = *std::max_element(factor.points.begin(), factor.points.end());
+  // Of traffic only trails level off, and their freshness ends at 1.
+  const bool of_trail = factor.shape == Shape::kLevelling && factor.axis.of == Covariate::kTraffic;
+  set_spline(function, factor, coefficients, 0, of_trail ? 1 : 6 * slowest, factor.points.front(), 60);
+}
+
+/// A map over two covariates, with columns x rows knots. value(i, j, x, y): at knot i, j.
+template <class Value>
+void set_map(Function& function, const Factor& factor, std::size_t columns, std::size_t rows, Value&& value) {
+  function.set_and_of(covariate_of(factor.and_axis.of));
+  proto::Spline2d& grid = *function.mutable_spline_2d();
+  const auto at = [](double low, double high, std::size_t i, std::size_t n) {
+    return low + (high - low) * static_cast<double>(i) / static_cast<double>(n - 1);
+  };
+  const auto x = [&](std::size_t i) { return at(factor.low, factor.high, i, columns); };
+  const auto y = [&](std::size_t j) { return at(factor.and_low, factor.and_high, j, rows); };
+  for (std::size_t i = 0; i < columns; ++i) grid.add_knot(rounded(x(i)));
+  for (std::size_t j = 0; j < rows; ++j) grid.add_and_knot(rounded(y(j)));
+  for (std::size_t j = 0; j < rows; ++j)
+    for (std::size_t i = 0; i < columns; ++i) grid.add_value(rounded(value(i, j, x(i), y(j))));
+}
+
 /// The sum of a factor's columns, weighted with the coefficients, as one function.
 Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) {
   if (!factor.known.empty()) {
@@ -135,93 +197,30 @@ Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) 
       break;
     }
     case Shape::kTaper: set_spline(function, factor, coefficients, 0, factor.high, 0, 25); break;
-    case Shape::kHarmonics: {
-      if (factor.count == 1 && factor.plus == 0) {
-        function.mutable_harmonic()->set_cosine(rounded(coefficients[0]));
-        function.mutable_harmonic()->set_sine(rounded(coefficients[1]));
-        function.mutable_harmonic()->set_period(2 * M_PI / factor.first);
-      } else {
+    case Shape::kHarmonics:
+      if (factor.count == 1 && factor.plus == 0)
+        set_harmonic(function, coefficients[0], coefficients[1], 2 * M_PI / factor.first);
+      else
         set_spline(function, factor, coefficients, -M_PI, M_PI, 0, 16 * static_cast<int>(factor.count) + 1);
-      }
       break;
-    }
-    case Shape::kTable:
-      for (std::size_t i = 0; i < factor.points.size(); ++i) {
-        if (factor.axis.of == Covariate::kPreviousCommand && factor.points[i] == kNoCommand) continue;
-        function.mutable_table()->add_key(static_cast<std::uint32_t>(factor.points[i]));
-        function.mutable_table()->add_value(rounded(factor.plus + coefficients[static_cast<Eigen::Index>(i)]));
-      }
-      if (factor.plus != 0) function.mutable_table()->set_otherwise(rounded(factor.plus));
-      break;
-    case Shape::kAtLeast: {
-      double value = 0;
-      function.mutable_steps()->add_value(0);
-      for (std::size_t i = 0; i < factor.points.size(); ++i) {
-        if (coefficients[static_cast<Eigen::Index>(i)] == 0) continue;
-        value += coefficients[static_cast<Eigen::Index>(i)];
-        function.mutable_steps()->add_at(rounded(factor.points[i]));
-        function.mutable_steps()->add_value(rounded(value));
-      }
-      break;
-    }
-    case Shape::kExponential: {
-      if (factor.points.size() == 1) {
-        function.mutable_exponential()->set_at_zero(rounded(coefficients[0]));
-        function.mutable_exponential()->set_scale(factor.points[0]);
-      } else {
-        const double slowest = *std::max_element(factor.points.begin(), factor.points.end());
-        set_spline(function, factor, coefficients, 0, 6 * slowest, factor.points.front(), 60);
-      }
-      break;
-    }
-    case Shape::kLevelling: {
-      if (factor.points.size() == 1) {
-        function.mutable_exponential()->set_at_infinity(rounded(coefficients[0]));
-        function.mutable_exponential()->set_scale(factor.points[0]);
-      } else {
-        const double slowest = *std::max_element(factor.points.begin(), factor.points.end());
-        // Of traffic only trails level off, and their freshness ends at 1.
-        const double end = factor.axis.of == Covariate::kTraffic ? 1 : 6 * slowest;
-        set_spline(function, factor, coefficients, 0, end, factor.points.front(), 60);
-      }
-      break;
-    }
-    case Shape::kWave: {
-      function.mutable_harmonic()->set_cosine(rounded(coefficients[0]));
-      function.mutable_harmonic()->set_sine(rounded(coefficients[1]));
-      function.mutable_harmonic()->set_period(factor.points[0]);
-      break;
-    }
+    case Shape::kTable: set_table(function, factor, coefficients); break;
+    case Shape::kAtLeast: set_steps(function, factor, coefficients); break;
+    case Shape::kExponential:
+    case Shape::kLevelling: set_exponential(function, factor, coefficients); break;
+    case Shape::kWave: set_harmonic(function, coefficients[0], coefficients[1], factor.points[0]); break;
     case Shape::kTravelling: break;  // a sum of products
-    case Shape::kGrid: {
-      function.set_and_of(covariate_of(factor.and_axis.of));
-      proto::Spline2d& grid = *function.mutable_spline_2d();
-      const std::size_t columns = factor.count, rows = factor.points.size() / columns;
-      const auto at = [](double low, double high, std::size_t i, std::size_t n) {
-        return rounded(low + (high - low) * static_cast<double>(i) / static_cast<double>(n - 1));
-      };
-      for (std::size_t i = 0; i < columns; ++i) grid.add_knot(at(factor.low, factor.high, i, columns));
-      for (std::size_t j = 0; j < rows; ++j) grid.add_and_knot(at(factor.and_low, factor.and_high, j, rows));
-      for (const double value : factor.points) grid.add_value(rounded(coefficients[0] * value));
+    case Shape::kGrid:
+      set_map(function, factor, factor.count, factor.points.size() / factor.count,
+              [&](std::size_t i, std::size_t j, double, double) {
+                return coefficients[0] * factor.points[j * factor.count + i];
+              });
       break;
-    }
     case Shape::kCosines2:
     case Shape::kPolynomials2: {
-      function.set_and_of(covariate_of(factor.and_axis.of));
-      proto::Spline2d& grid = *function.mutable_spline_2d();
-      const int knots = 4 * static_cast<int>(factor.count) + 5;
-      const auto at = [&](double low, double high, int i) { return low + (high - low) * i / (knots - 1); };
-      for (int i = 0; i < knots; ++i) {
-        grid.add_knot(rounded(at(factor.low, factor.high, i)));
-        grid.add_and_knot(rounded(at(factor.and_low, factor.and_high, i)));
-      }
-      for (int j = 0; j < knots; ++j) {
-        for (int i = 0; i < knots; ++i) {
-          const Situation s = with(factor.and_axis, at(factor.and_low, factor.and_high, j),
-                                   with(factor.axis, at(factor.low, factor.high, i)));
-          grid.add_value(rounded(sum_at(factor, coefficients, s)));
-        }
-      }
+      const std::size_t knots = 4 * std::size_t{factor.count} + 5;
+      set_map(function, factor, knots, knots, [&](std::size_t, std::size_t, double x, double y) {
+        return sum_at(factor, coefficients, with(factor.and_axis, y, with(factor.axis, x)));
+      });
       break;
     }
   }

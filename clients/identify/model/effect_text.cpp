@@ -11,6 +11,7 @@
 #include "clients/identify/result/values.hpp"
 #include "core/effects/function.hpp"
 #include "core/plan/from_manifest.hpp"
+#include "core/stats/quantiles.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -265,10 +266,8 @@ struct MapSum {
   std::vector<double> value;  ///< [y][x]
 
   [[nodiscard]] double quantile(double share) const {
-    std::vector<double> sorted = value;
-    const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(sorted.size() - 1));
-    std::nth_element(sorted.begin(), at, sorted.end());
-    return *at;
+    std::vector<double> values = value;
+    return stats::lower_quantile(values, share);
   }
 };
 

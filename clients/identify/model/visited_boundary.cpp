@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/stats/quantiles.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -12,9 +14,7 @@ constexpr double kStrip_mm = 30;
 /// produce outliers.
 double near_the_end(std::vector<double>& values, std::size_t fewest, double share) {
   const std::size_t beyond = std::max(fewest, static_cast<std::size_t>(share * static_cast<double>(values.size())));
-  const std::size_t rank = values.size() - 1 - std::min(beyond, values.size() - 1);
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(rank), values.end());
-  return values[rank];
+  return stats::upper_end(values, beyond);
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <cstdint>
 
 #include "core/random/random.hpp"
+#include "core/stats/quantiles.hpp"
+#include "core/stats/resampling.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -14,21 +16,14 @@ constexpr std::int64_t kDraws = 2000;
 double root_mean(double sum, std::size_t rows) { return rows > 0 ? std::sqrt(sum / static_cast<double>(rows)) : 0; }
 
 Interval middle_95(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const auto last = static_cast<double>(values.size() - 1);
-  return {values[static_cast<std::size_t>(std::lround(0.025 * last))],
-          values[static_cast<std::size_t>(std::lround(0.975 * last))]};
+  return {stats::nearest_quantile(values, 0.025), stats::nearest_quantile(values, 0.975)};
 }
 
-/// Bootstrap weights: how often each of `count` items occurs in `count` draws with replacement. A single item
-/// counts once.
 std::vector<double> drawn(const Random& random, std::size_t count, std::int64_t k, std::uint32_t what) {
-  std::vector<double> times(count, count == 1 ? 1.0 : 0.0);
-  for (std::uint32_t i = 0; count > 1 && i < count; ++i) {
-    const double u = random.uniform(Stream::kLayout, i, Tick{k}, what);
-    times[std::min(count - 1, static_cast<std::size_t>(u * static_cast<double>(count)))] += 1;
-  }
-  return times;
+  return stats::bootstrap_weights(count, [&](std::size_t i) {
+    const double u = random.uniform(Stream::kLayout, static_cast<std::uint32_t>(i), Tick{k}, what);
+    return std::min(count - 1, static_cast<std::size_t>(u * static_cast<double>(count)));
+  });
 }
 
 /// The error of one prediction, in the body frame at its start.

@@ -41,87 +41,133 @@ class Normals {
   std::array<std::uint32_t, 2> key_;
 };
 
+/// A random vector of the distribution N(0, covariance), by a root of the covariance and standard normal numbers.
+template <int n>
+Eigen::Matrix<double, n, 1> correlated(const Eigen::Matrix<double, n, n>& covariance,
+                                       const Eigen::Matrix<double, n, 1>& normals) {
+  const Eigen::LDLT<Eigen::Matrix<double, n, n>> root(covariance);
+  const Eigen::Matrix<double, n, 1> scaled = root.vectorD().cwiseMax(0).cwiseSqrt().cwiseProduct(normals);
+  return root.transpositionsP().transpose() * (root.matrixL() * scaled);
+}
+
+/// Joint random rollouts of robots: each has a known state, and steps with the process noise.
+class Rollout {
+ public:
+  Rollout(const MotionModel& model, const std::vector<RolloutStart>& robots, bool neighbours,
+          std::array<std::uint32_t, 2> key)
+      : model_(model),
+        robots_(robots),
+        neighbours_(neighbours),
+        normals_(key),
+        x_(robots.size()),
+        y_(robots.size()),
+        near_(robots.size()) {}
+
+  /// Draws the robots' states. Samples come in antithetic pairs.
+  void start(std::uint32_t sample) {
+    sample_ = sample;
+    mirror_ = sample % 2 == 0 ? 1 : -1;
+    filters_.clear();
+    for (std::uint32_t r = 0; r < robots_.size(); ++r) {
+      double left = normals_.uniform(sample, r);
+      std::size_t chosen = 0;
+      while (chosen + 1 < robots_[r].filters.size() && left > robots_[r].weights[chosen])
+        left -= robots_[r].weights[chosen++];
+      TrackFilter& filter = filters_.emplace_back(*robots_[r].filters[chosen]);
+      filter.begin_forecast();
+      Belief& belief = filter.belief();
+      belief.mean += mirror_ * correlated<5>(belief.covariance, normals_.draw<5>(sample / 2, r, 0));
+      belief.covariance.setZero();
+    }
+  }
+  /// `number`: of the step, from 1.
+  void step(std::uint32_t number, double now_s, double next_s, TrafficGrids& grids) {
+    see_neighbours(now_s, next_s, grids);
+    for (std::uint32_t r = 0; r < robots_.size(); ++r) {
+      sub_steps(
+          *robots_[r].view->clock, number == 1 ? robots_[r].now_s : now_s, next_s,
+          [&](double t, double h, const CommandState& commands) { filters_[r].step(t, h, commands, near_[r]); });
+      Belief& belief = filters_[r].belief();
+      belief.mean.head<3>() += mirror_ * correlated<3>(belief.covariance.topLeftCorner<3, 3>(),
+                                                       normals_.draw<3>(sample_ / 2, r, number));
+      belief.covariance.setZero();
+    }
+    resolve_contacts();
+  }
+  void add_places(double at_s, std::vector<RolloutMoments>& to) const {
+    for (std::size_t r = 0; r < robots_.size(); ++r) {
+      const Eigen::Vector3d seen = filters_[r].expected(at_s, robots_[r].view->clock->at(at_s - 1e-9));
+      to[r].x_mm += seen[0];
+      to[r].y_mm += seen[1];
+      to[r].square_mm2 += seen.head<2>().squaredNorm();
+    }
+  }
+
+ private:
+  void find_centres() {
+    for (std::size_t r = 0; r < robots_.size(); ++r) {
+      x_[r] = filters_[r].belief().centre_x_mm();
+      y_[r] = filters_[r].belief().centre_y_mm();
+    }
+  }
+  void see_neighbours(double now_s, double next_s, TrafficGrids& grids) {
+    find_centres();
+    list_.clear();
+    for (std::size_t r = 0; r < robots_.size(); ++r) {
+      near_[r] = neighbours_ ? view_of(r, x_, y_, &list_) : NeighbourView{};
+      grids.see(robots_[r].view->place, x_[r], y_[r], now_s, near_[r]);
+    }
+    for (std::size_t r = 0; grids.any() && r < robots_.size(); ++r)
+      if (robots_[r].view->clock->at(now_s).driven())
+        grids.add(robots_[r].view->place, x_[r], y_[r], next_s - now_s, now_s);
+  }
+  /// Separates robots that overlap, and keeps all within the walls.
+  void resolve_contacts() {
+    find_centres();
+    const std::vector<double> free_x = x_, free_y = y_;
+    for (int pass = 0; pass < kPasses; ++pass) {
+      const bool pushed = model_.contacts && push_apart(x_, y_);
+      for (std::size_t r = 0; r < robots_.size(); ++r) {
+        x_[r] = model_.walls.inside_x(x_[r]);
+        y_[r] = model_.walls.inside_y(y_[r]);
+      }
+      if (!pushed) break;
+    }
+    for (std::size_t r = 0; r < robots_.size(); ++r) {
+      filters_[r].belief().mean[0] += x_[r] - free_x[r];
+      filters_[r].belief().mean[1] += y_[r] - free_y[r];
+    }
+  }
+
+  const MotionModel& model_;
+  const std::vector<RolloutStart>& robots_;
+  const bool neighbours_;
+  const Normals normals_;
+  std::uint32_t sample_ = 0;
+  double mirror_ = 1;
+  std::vector<TrackFilter> filters_;
+  std::vector<double> x_, y_;  ///< disc centres
+  std::vector<NeighbourView> near_;
+  std::vector<OtherRobot> list_;
+};
+
 }  // namespace
 
 std::vector<RolloutMoments> rollouts(const MotionModel& model, const std::vector<RolloutStart>& robots,
                                      const TrafficGrids& initial_grids, double from_s, double to_s,
                                      std::uint32_t count, bool neighbours, std::array<std::uint32_t, 2> key) {
-  const Normals normals(key);
   std::vector<RolloutMoments> out(robots.size());
-  std::vector<double> x(robots.size()), y(robots.size());
-  std::vector<TrackFilter> filters;
-  std::vector<NeighbourView> nears(robots.size());
-  std::vector<OtherRobot> list;
+  Rollout rollout(model, robots, neighbours, key);
   for (std::uint32_t sample = 0; sample < count; ++sample) {
-    // Antithetic pairs.
-    const double mirror = sample % 2 == 0 ? 1 : -1;
-    filters.clear();
-    for (std::uint32_t r = 0; r < robots.size(); ++r) {
-      double left = normals.uniform(sample, r);
-      std::size_t chosen = 0;
-      while (chosen + 1 < robots[r].filters.size() && left > robots[r].weights[chosen])
-        left -= robots[r].weights[chosen++];
-      TrackFilter& filter = filters.emplace_back(*robots[r].filters[chosen]);
-      filter.begin_forecast();
-      Belief& belief = filter.belief();
-      const Eigen::LDLT<StateCovariance> root(belief.covariance);
-      const State scaled = root.vectorD().cwiseMax(0).cwiseSqrt().cwiseProduct(normals.draw<5>(sample / 2, r, 0));
-      belief.mean += mirror * (root.transpositionsP().transpose() * (root.matrixL() * scaled));
-      belief.covariance.setZero();
-    }
+    rollout.start(sample);
     double now_s = from_s;
     TrafficGrids grids = initial_grids;
     for (std::uint32_t step = 1; now_s < to_s - 1e-9; ++step) {
       const double next_s = std::min(to_s, now_s + kRaster_s);
-      for (std::size_t r = 0; r < robots.size(); ++r) {
-        x[r] = filters[r].belief().centre_x_mm();
-        y[r] = filters[r].belief().centre_y_mm();
-      }
-      list.clear();
-      for (std::size_t r = 0; r < robots.size(); ++r) {
-        nears[r] = neighbours ? view_of(r, x, y, &list) : NeighbourView{};
-        grids.see(robots[r].view->place, x[r], y[r], now_s, nears[r]);
-      }
-      for (std::size_t r = 0; grids.any() && r < robots.size(); ++r)
-        if (robots[r].view->clock->at(now_s).driven())
-          grids.add(robots[r].view->place, x[r], y[r], next_s - now_s, now_s);
-      for (std::uint32_t r = 0; r < robots.size(); ++r) {
-        const NeighbourView& near = nears[r];
-        const double start_s = step == 1 ? robots[r].now_s : now_s;
-        Belief& belief = filters[r].belief();
-        sub_steps(*robots[r].view->clock, start_s, next_s,
-                  [&](double t, double h, const CommandState& commands) { filters[r].step(t, h, commands, near); });
-        const Eigen::LDLT<Eigen::Matrix3d> root(belief.covariance.topLeftCorner<3, 3>());
-        const Eigen::Vector3d scaled =
-            root.vectorD().cwiseMax(0).cwiseSqrt().cwiseProduct(normals.draw<3>(sample / 2, r, step));
-        belief.mean.head<3>() += mirror * (root.transpositionsP().transpose() * (root.matrixL() * scaled));
-        belief.covariance.setZero();
-      }
-      for (std::size_t r = 0; r < robots.size(); ++r) {
-        x[r] = filters[r].belief().centre_x_mm();
-        y[r] = filters[r].belief().centre_y_mm();
-      }
-      std::vector<double> free_x = x, free_y = y;
-      for (int pass = 0; pass < kPasses; ++pass) {
-        const bool pushed = model.contacts && push_apart(x, y);
-        for (std::size_t r = 0; r < robots.size(); ++r) {
-          x[r] = model.walls.inside_x(x[r]);
-          y[r] = model.walls.inside_y(y[r]);
-        }
-        if (!pushed) break;
-      }
-      for (std::size_t r = 0; r < robots.size(); ++r) {
-        filters[r].belief().mean[0] += x[r] - free_x[r];
-        filters[r].belief().mean[1] += y[r] - free_y[r];
-      }
+      rollout.step(step, now_s, next_s, grids);
       now_s = next_s;
     }
-    for (std::size_t r = 0; r < robots.size(); ++r) {
-      const Eigen::Vector3d seen = filters[r].expected(to_s, robots[r].view->clock->at(to_s - 1e-9));
-      out[r].x_mm += seen[0];
-      out[r].y_mm += seen[1];
-      out[r].square_mm2 += seen.head<2>().squaredNorm();
-    }
+    rollout.add_places(to_s, out);
   }
   for (RolloutMoments& f : out) {
     f.x_mm /= count;

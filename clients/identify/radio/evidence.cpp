@@ -8,6 +8,8 @@
 #include <random>
 
 #include "core/stats/distributions.hpp"
+#include "core/stats/moments.hpp"
+#include "core/stats/resampling.hpp"
 
 namespace kilotwin::radio_fit {
 namespace {
@@ -85,16 +87,16 @@ Evidence explained(std::string what, const MatrixXd& regressors, const VectorXd&
   };
   Evidence evidence{std::move(what), share(centred), 0, 0};
   std::mt19937_64 random(1);
-  double squares = 0;
-  VectorXd shuffled = centred;
+  stats::Moments by_chance;
+  VectorXd permuted = centred;
   for (int k = 0; k < kShuffles; ++k) {
-    for (Eigen::Index n = shuffled.size(); n-- > 1;)
-      std::swap(shuffled(n), shuffled(static_cast<Eigen::Index>(random() % static_cast<std::uint64_t>(n + 1))));
-    const double s = share(shuffled);
-    evidence.by_chance += s / kShuffles;
-    squares += s * s / kShuffles;
+    stats::permute(
+        static_cast<std::size_t>(permuted.size()), [&](std::size_t n) { return random() % n; },
+        [&](std::size_t i, std::size_t j) { std::swap(permuted.data()[i], permuted.data()[j]); });
+    by_chance.add(share(permuted));
   }
-  evidence.by_chance_sd = std::sqrt(std::max(0.0, squares - evidence.by_chance * evidence.by_chance));
+  evidence.by_chance = by_chance.mean();
+  evidence.by_chance_sd = by_chance.standard_deviation();
   return evidence;
 }
 

@@ -17,6 +17,7 @@
 #include "clients/report/plot.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
+#include "core/stats/quantiles.hpp"
 #include "idl/model.pb.h"
 
 namespace kilotwin::radio_fit {
@@ -385,10 +386,7 @@ void Loop::draw_population() {
       for (std::size_t c = 0; c < drawn.size(); ++c) drawn[c].push_back(s.classes[c].reception);
     }
     for (std::size_t c = 0; c < drawn.size(); ++c) {
-      std::sort(drawn[c].begin(), drawn[c].end());
-      const auto at = [&](double share) {
-        return drawn[c][static_cast<std::size_t>(share * static_cast<double>(drawn[c].size() - 1) + 0.5)];
-      };
+      const auto at = [&](double share) { return stats::nearest_quantile(drawn[c], share); };
       const DisplacementClass& is = real.classes[c];
       identification::PopulationClass& row = population_.emplace_back();
       row.set_set(train_[q].name);

@@ -6,6 +6,8 @@
 
 #include "clients/identify/model/covariates.hpp"
 #include "core/random/random.hpp"
+#include "core/stats/quantiles.hpp"
+#include "core/stats/resampling.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -24,13 +26,6 @@ std::vector<double> edges(double low, double high, std::size_t bins) {
   for (std::size_t i = 0; i <= bins; ++i)
     out[i] = low + (high - low) * static_cast<double>(i) / static_cast<double>(bins);
   return out;
-}
-
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
 }
 
 /// Values beyond the edges count in the outermost bins.
@@ -133,7 +128,7 @@ TrackStatistics::TrackStatistics(const std::vector<const Track*>& tracks, const 
     first_s_ = std::min(first_s_, track->samples.front().time_s);
     last_s_ = std::max(last_s_, track->samples.back().time_s);
   }
-  segment_s_ = std::max(segment_s_, quantile(steps, 0.5));
+  segment_s_ = std::max(segment_s_, stats::lower_quantile(steps, 0.5));
   std::vector<double> speeds, turns;
   for (const Track* track : tracks) {
     motion_segments(
@@ -141,10 +136,10 @@ TrackStatistics::TrackStatistics(const std::vector<const Track*>& tracks, const 
         [&](double w) { turns.push_back(std::abs(w)); });
   }
   if (speeds.size() < 10 || !(last_s_ > first_s_)) return;
-  const double fastest = std::max(1.0, 1.25 * quantile(speeds, 0.99));
+  const double fastest = std::max(1.0, 1.25 * stats::lower_quantile(speeds, 0.99));
   list_.push_back({Statistic::Kind::kHistogram, "speed", "mm/s", edges(0, fastest, kBins), "mm/s"});
   if (turns.size() >= 10) {
-    const double most = std::max(0.02, 1.25 * quantile(turns, 0.99));
+    const double most = std::max(0.02, 1.25 * stats::lower_quantile(turns, 0.99));
     list_.push_back({Statistic::Kind::kHistogram, "turning", "rad/s", edges(-most, most, kBins), "rad/s"});
   }
   std::vector<double> middles = edges(first_s_, last_s_, kTimeBins);
@@ -153,13 +148,14 @@ TrackStatistics::TrackStatistics(const std::vector<const Track*>& tracks, const 
   list_.push_back({Statistic::Kind::kMeans, "mean speed over the run", "s", middles, "mm/s"});
   std::vector<double> lags;
   for (const double lag_s : {1., 2., 5., 10., 20., 50., 100., 200., 500., 1000.})
-    if (lag_s >= quantile(steps, 0.5) * 0.99 && lag_s <= 0.5 * (last_s_ - first_s_)) lags.push_back(lag_s);
+    if (lag_s >= stats::lower_quantile(steps, 0.5) * 0.99 && lag_s <= 0.5 * (last_s_ - first_s_))
+      lags.push_back(lag_s);
   if (lags.size() >= 2) list_.push_back({Statistic::Kind::kSquares, "mean square displacement", "s", lags, "%"});
   if (!has_walls_) return;
   std::vector<double> from_walls;
   for (const Track* track : tracks)
     for (const Sample& s : track->samples) from_walls.push_back(wall_distance_mm(s));
-  const double farthest_mm = std::max(kWallBins_mm, quantile(from_walls, 0.995));
+  const double farthest_mm = std::max(kWallBins_mm, stats::lower_quantile(from_walls, 0.995));
   list_.push_back({Statistic::Kind::kHistogram, "distance from the walls", "mm",
                    edges(0, farthest_mm, static_cast<std::size_t>(farthest_mm / kWallBins_mm) + 1), "mm"});
   list_.push_back({Statistic::Kind::kMeans, "share of time at walls", "", {0}, ""});
@@ -269,8 +265,8 @@ Comparison compare(const Statistic& statistic, const std::vector<Tally>& measure
     null_distances.push_back(permuted_distance(exchanged));
     if (null_distances.back() >= out.distance * (1 - 1e-12)) ++exceedances;
   }
-  out.by_chance_95 = quantile(null_distances, 0.95);
-  out.p = (1.0 + exceedances) / (1.0 + kExchanges);
+  out.by_chance_95 = stats::lower_quantile(null_distances, 0.95);
+  out.p = stats::permutation_p(exceedances, kExchanges);
   return out;
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/os/worker_pool.hpp"
+#include "core/stats/quantiles.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -205,11 +206,8 @@ Eigen::Vector4d usual_excess(const std::vector<Candidate>& all) {
       squares.push_back(c.size[i] * c.size[i]);
       expected.push_back(c.covariance(i, i));
     }
-    const auto middle = static_cast<std::ptrdiff_t>(all.size() / 2);
-    std::nth_element(squares.begin(), squares.begin() + middle, squares.end());
-    std::nth_element(expected.begin(), expected.begin() + middle, expected.end());
     constexpr double kMedianOfChiSquared = 0.4549;
-    excess[i] = std::max(0.0, squares[all.size() / 2] / kMedianOfChiSquared - expected[all.size() / 2]);
+    excess[i] = std::max(0.0, stats::upper_median(squares) / kMedianOfChiSquared - stats::upper_median(expected));
   }
   return excess;
 }
@@ -258,10 +256,9 @@ std::optional<CalibrationShift> find_calibration_shift(const Fitter& fitter, con
   }
   constexpr std::size_t kFewest = 20;
   if (steps.size() < kFewest) return std::nullopt;
-  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
   constexpr int kMostInstants = 20000;
-  const double frame_s = steps[steps.size() / 2];
-  const double step_s = std::max(steps[steps.size() / 2] / 2, (to_s - from_s) / kMostInstants);
+  const double frame_s = stats::upper_median(steps);
+  const double step_s = std::max(frame_s / 2, (to_s - from_s) / kMostInstants);
 
   std::vector<Scan> scans{Scan(all, std::nullopt)};
   if (runs.size() > 1)

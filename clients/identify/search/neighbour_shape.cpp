@@ -7,6 +7,7 @@
 
 #include "clients/identify/search/local_quadratic.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
+#include "core/stats/quantiles.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -48,10 +49,7 @@ std::array<double, kNeighbourRadii_mm.size()> densities(const PreparedSet& set) 
   }
   std::array<double, kNeighbourRadii_mm.size()> most{};
   for (std::size_t r = 0; r < all.size(); ++r) {
-    if (all[r].empty()) continue;
-    const auto at = all[r].begin() + static_cast<std::ptrdiff_t>(all[r].size() - 1 - all[r].size() / 1000);
-    std::nth_element(all[r].begin(), at, all[r].end());
-    most[r] = *at;
+    if (!all[r].empty()) most[r] = stats::upper_end(all[r], all[r].size() / 1000);
   }
   return most;
 }

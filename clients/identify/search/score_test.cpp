@@ -8,50 +8,12 @@
 #include <numeric>
 
 #include "core/random/random.hpp"
+#include "core/stats/distributions.hpp"
 
 namespace kilotwin::identify {
 namespace {
 
 constexpr std::size_t kFolds = 6;
-
-/// log10 of the upper tail of chi squared, by the continued fraction or the series of the incomplete gamma
-/// function.
-double log10_tail(double statistic, double degrees) {
-  const double a = degrees / 2, x = std::max(statistic, 0.0) / 2;
-  if (x <= 0) return 0;
-  const double front = a * std::log(x) - x - std::lgamma(a);
-  if (x < a + 1) {
-    double term = 1 / a, sum = term;
-    for (int n = 1; n < 500 && term > 1e-15 * sum; ++n) sum += term *= x / (a + n);
-    return std::log10(std::max(1e-300, 1 - std::min(1.0, std::exp(front) * sum)));
-  }
-  double b = x + 1 - a, c = 1e300, d = 1 / b, h = d;
-  for (int i = 1; i < 500; ++i) {
-    const double an = -i * (i - a);
-    b += 2;
-    d = 1 / (std::abs(an * d + b) < 1e-300 ? 1e-300 : an * d + b);
-    c = std::abs(b + an / c) < 1e-300 ? 1e-300 : b + an / c;
-    const double ratio = d * c;
-    h *= ratio;
-    if (std::abs(ratio - 1) < 1e-12) break;
-  }
-  return (front + std::log(h)) / std::log(10.0);
-}
-
-template <class Matrix>
-Eigen::MatrixXd pick(const Matrix& from, const std::vector<Eigen::Index>& rows,
-                     const std::vector<Eigen::Index>& cols) {
-  Eigen::MatrixXd out(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(cols.size()));
-  for (std::size_t j = 0; j < cols.size(); ++j)
-    for (std::size_t i = 0; i < rows.size(); ++i)
-      out(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = from(rows[i], cols[j]);
-  return out;
-}
-Eigen::VectorXd pick(const Eigen::VectorXd& from, const std::vector<Eigen::Index>& rows) {
-  Eigen::VectorXd out(static_cast<Eigen::Index>(rows.size()));
-  for (std::size_t i = 0; i < rows.size(); ++i) out[static_cast<Eigen::Index>(i)] = from[rows[i]];
-  return out;
-}
 
 bool of_robots(const Hypothesis& h) {
   return std::find(h.covariates.begin(), h.covariates.end(), "robot") != h.covariates.end();
@@ -90,6 +52,33 @@ double within_groups(const Eigen::MatrixXd& scores, const std::vector<std::size_
 bool looks_at_runs(const Term& term) {
   return std::any_of(term.blocks.begin(), term.blocks.end(),
                      [](const Block& block) { return block.basis.looks_at(Covariate::kRun); });
+}
+
+constexpr Eigen::Index kFlips = 400;
+
+/// Random signs, one row per cluster and one column per flip.
+Eigen::MatrixXd signs(Eigen::Index clusters, std::uint64_t seed) {
+  const std::array<std::uint32_t, 2> key{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)};
+  return Eigen::MatrixXd::NullaryExpr(clusters, kFlips, [&](Eigen::Index c, Eigen::Index f) {
+    const auto word = philox4x32({static_cast<std::uint32_t>(c), static_cast<std::uint32_t>(f), 0, 0}, key)[0];
+    return (word & 1) != 0 ? 1.0 : -1.0;
+  });
+}
+
+/// W with W I W' = 1, for the information I of columns whose prior has these standard deviations. Without
+/// directions that have no information, or that the model already contains.
+Eigen::MatrixXd whitening(const Eigen::MatrixXd& information, const Eigen::VectorXd& scale) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * information * scale.asDiagonal());
+  const double least = std::max(1e-7 * eigen.eigenvalues().maxCoeff(), 1.0);
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index i = 0; i < scale.size(); ++i)
+    if (eigen.eigenvalues()[i] > least) kept.push_back(i);
+  Eigen::MatrixXd whiten(static_cast<Eigen::Index>(kept.size()), scale.size());
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    whiten.row(static_cast<Eigen::Index>(i)) = eigen.eigenvectors().col(kept[i]).transpose() * scale.asDiagonal() /
+                                               std::sqrt(eigen.eigenvalues()[kept[i]]);
+  }
+  return whiten;
 }
 
 }  // namespace
@@ -176,21 +165,21 @@ ScoreTest::Reduced ScoreTest::reduce(const std::vector<Eigen::Index>& columns, i
     return moved ? Eigen::VectorXd(score + information * taken_out) : score;
   };
   Reduced out;
-  Eigen::MatrixXd own = pick(information_, nuisance, nuisance);
+  Eigen::MatrixXd own = information_(nuisance, nuisance);
   for (std::size_t i = 0; i < nuisance.size(); ++i)
     own(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(i)) += prior_[nuisance[i]];
-  const Eigen::MatrixXd cross = pick(information_, nuisance, columns);
+  const Eigen::MatrixXd cross = information_(nuisance, columns);
   const Eigen::MatrixXd by = own.ldlt().solve(cross);
   const auto reduced = [&](const Eigen::MatrixXd& information) {
-    const Eigen::MatrixXd part = pick(information, nuisance, columns);
-    Eigen::MatrixXd result = pick(information, columns, columns);
+    const Eigen::MatrixXd part = information(nuisance, columns);
+    Eigen::MatrixXd result = information(columns, columns);
     result -= by.transpose() * part;
     result -= part.transpose() * by;
-    result += by.transpose() * pick(information, nuisance, nuisance) * by;
+    result += by.transpose() * Eigen::MatrixXd(information(nuisance, nuisance)) * by;
     return result;
   };
   const auto reduced_score = [&](const Eigen::VectorXd& score) {
-    return Eigen::VectorXd(pick(score, columns) - by.transpose() * pick(score, nuisance));
+    return Eigen::VectorXd(score(columns) - by.transpose() * score(nuisance));
   };
   out.information =
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(columns.size()), static_cast<Eigen::Index>(columns.size()));
@@ -245,8 +234,8 @@ Finding ScoreTest::evidence_of(const Reduced& reduced, const Eigen::VectorXd& sc
 Finding ScoreTest::evidence_of(const Hypothesis& hypothesis, int without_term) const {
   std::vector<Eigen::Index> columns;
   for (const Eigen::Index c : hypothesis.columns) columns.push_back(own_ + c);
-  return evidence_of(reduce(columns, without_term, of_robots(hypothesis)),
-                     pick(dictionary_.scale, hypothesis.columns), hypothesis.log_choices);
+  return evidence_of(reduce(columns, without_term, of_robots(hypothesis)), dictionary_.scale(hypothesis.columns),
+                     hypothesis.log_choices);
 }
 
 Finding ScoreTest::evidence_of_term(int term) const {
@@ -260,74 +249,54 @@ Finding ScoreTest::evidence_of_term(int term) const {
   return evidence_of(reduce(columns, term, of_each), own.precision.cwiseInverse().cwiseSqrt(), 0);
 }
 
-ScoreTest::Outcome ScoreTest::test(std::uint64_t seed) const {
-  // The whole dictionary at once, reduced by the model.
-  std::vector<Eigen::Index> columns, nuisance;
-  for (Eigen::Index c = own_; c < information_.rows(); ++c) columns.push_back(c);
-  for (Eigen::Index i = 0; i < own_; ++i) nuisance.push_back(i);
+/// The whole dictionary at once, reduced by the model.
+ScoreTest::ReducedDictionary ScoreTest::reduced_dictionary() const {
+  const Eigen::Index columns = dictionary_.columns();
   Eigen::MatrixXd own = information_.topLeftCorner(own_, own_);
   own.diagonal() += prior_;
-  const Eigen::MatrixXd by = own.ldlt().solve(information_.topRightCorner(own_, dictionary_.columns()));
-  const Eigen::MatrixXd beside = information_.bottomRightCorner(dictionary_.columns(), dictionary_.columns()) -
-                                 information_.bottomLeftCorner(dictionary_.columns(), own_) * by;
-  const Eigen::MatrixXd cluster =
-      clusters_.bottomRows(dictionary_.columns()) - by.transpose() * clusters_.topRows(own_);
-  const Eigen::VectorXd score = score_.tail(dictionary_.columns()) - by.transpose() * score_.head(own_);
+  const Eigen::MatrixXd by = own.ldlt().solve(information_.topRightCorner(own_, columns));
+  return {information_.bottomRightCorner(columns, columns) - information_.bottomLeftCorner(columns, own_) * by,
+          clusters_.bottomRows(columns) - by.transpose() * clusters_.topRows(own_),
+          score_.tail(columns) - by.transpose() * score_.head(own_)};
+}
 
-  constexpr Eigen::Index kFlips = 400;
-  const std::array<std::uint32_t, 2> key{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)};
-  Eigen::MatrixXd signs(cluster.cols(), kFlips);
-  for (Eigen::Index f = 0; f < kFlips; ++f)
-    for (Eigen::Index c = 0; c < cluster.cols(); ++c)
-      signs(c, f) =
-          (philox4x32({static_cast<std::uint32_t>(c), static_cast<std::uint32_t>(f), 0, 0}, key)[0] & 1) != 0 ? 1
-                                                                                                              : -1;
-  const Eigen::MatrixXd flipped = cluster * signs;
-
-  Outcome out;
-  out.findings.resize(dictionary_.hypotheses.size());
-  Eigen::MatrixXd worst = Eigen::VectorXd::Zero(kFlips);
-  for (std::size_t h = 0; h < dictionary_.hypotheses.size(); ++h) {
-    const std::vector<Eigen::Index>& own_columns = dictionary_.hypotheses[h].columns;
-    Finding& finding = out.findings[h];
-    finding.hypothesis = h;
-    const Eigen::VectorXd scale = pick(dictionary_.scale, own_columns);
-    const Eigen::MatrixXd scaled = scale.asDiagonal() * pick(beside, own_columns, own_columns) * scale.asDiagonal();
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
-    const double top = eigen.eigenvalues().maxCoeff();
-    // Drops directions without information, and those that the model already contains.
-    std::vector<Eigen::Index> kept;
-    for (Eigen::Index i = 0; i < eigen.eigenvalues().size(); ++i)
-      if (eigen.eigenvalues()[i] > std::max(1e-7 * top, 1.0)) kept.push_back(i);
-    finding.degrees = static_cast<int>(kept.size());
-    if (kept.empty()) continue;
-    Eigen::MatrixXd whiten(static_cast<Eigen::Index>(kept.size()), scale.size());
-    for (std::size_t i = 0; i < kept.size(); ++i) {
-      whiten.row(static_cast<Eigen::Index>(i)) = eigen.eigenvectors().col(kept[i]).transpose() *
-                                                 scale.asDiagonal() / std::sqrt(eigen.eigenvalues()[kept[i]]);
-    }
-    const double degrees = static_cast<double>(kept.size());
-    finding.statistic = (whiten * pick(score, own_columns)).squaredNorm();
-    Eigen::MatrixXd flips(scale.size(), kFlips);
-    for (Eigen::Index i = 0; i < scale.size(); ++i)
-      flips.row(i) = flipped.row(own_columns[static_cast<std::size_t>(i)]);
-    const Eigen::VectorXd statistics = (whiten * flips).colwise().squaredNorm();
-    const double dispersion = std::max(1.0, statistics.mean() / degrees);
-    double own_dispersion = dispersion;
-    // Differences between robots or runs are signal for such hypotheses, not noise.
-    const bool robots = of_robots(dictionary_.hypotheses[h]);
-    if (robots || looks_at_runs(dictionary_.term_of(dictionary_.hypotheses[h], 1))) {
-      Eigen::MatrixXd scores(scale.size(), cluster.cols());
-      for (Eigen::Index i = 0; i < scale.size(); ++i)
-        scores.row(i) = cluster.row(own_columns[static_cast<std::size_t>(i)]);
-      const double within =
-          robots ? within_units(whiten * scores, cluster_unit_) : within_groups(whiten * scores, cluster_run_);
-      if (within > 0) own_dispersion = std::clamp(within / degrees, 1.0, dispersion);
-    }
-    finding.log10_p = log10_tail(finding.statistic / own_dispersion, degrees);
-    for (Eigen::Index f = 0; f < kFlips; ++f)
-      worst(f) = std::min(worst(f), log10_tail(statistics[f] / dispersion, degrees));
+/// Tests one hypothesis. Lowers `worst` to its log10 p value under each flip.
+Finding ScoreTest::finding_of(std::size_t h, const ReducedDictionary& reduced, const Eigen::MatrixXd& flipped,
+                              Eigen::VectorXd& worst) const {
+  const Hypothesis& hypothesis = dictionary_.hypotheses[h];
+  const std::vector<Eigen::Index>& columns = hypothesis.columns;
+  Finding finding;
+  finding.hypothesis = h;
+  const Eigen::VectorXd scale = dictionary_.scale(columns);
+  const Eigen::MatrixXd whiten = whitening(reduced.information(columns, columns), scale);
+  finding.degrees = static_cast<int>(whiten.rows());
+  if (whiten.rows() == 0) return finding;
+  const auto degrees = static_cast<double>(whiten.rows());
+  finding.statistic = (whiten * reduced.score(columns)).squaredNorm();
+  const Eigen::VectorXd statistics =
+      (whiten * Eigen::MatrixXd(flipped(columns, Eigen::all))).colwise().squaredNorm();
+  const double dispersion = std::max(1.0, statistics.mean() / degrees);
+  double own_dispersion = dispersion;
+  // Differences between robots or runs are signal for such hypotheses, not noise.
+  const bool robots = of_robots(hypothesis);
+  if (robots || looks_at_runs(dictionary_.term_of(hypothesis, 1))) {
+    const Eigen::MatrixXd scores = whiten * Eigen::MatrixXd(reduced.clusters(columns, Eigen::all));
+    const double within = robots ? within_units(scores, cluster_unit_) : within_groups(scores, cluster_run_);
+    if (within > 0) own_dispersion = std::clamp(within / degrees, 1.0, dispersion);
   }
+  finding.log10_p = stats::log10_chi_squared_tail(finding.statistic / own_dispersion, degrees);
+  for (Eigen::Index f = 0; f < kFlips; ++f)
+    worst(f) = std::min(worst(f), stats::log10_chi_squared_tail(statistics[f] / dispersion, degrees));
+  return finding;
+}
+
+ScoreTest::Outcome ScoreTest::test(std::uint64_t seed) const {
+  const ReducedDictionary reduced = reduced_dictionary();
+  const Eigen::MatrixXd flipped = reduced.clusters * signs(reduced.clusters.cols(), seed);
+  Outcome out;
+  Eigen::VectorXd worst = Eigen::VectorXd::Zero(kFlips);
+  for (std::size_t h = 0; h < dictionary_.hypotheses.size(); ++h)
+    out.findings.push_back(finding_of(h, reduced, flipped, worst));
   // The minimum over many p values follows a Gumbel distribution on the log scale.
   const double mean = worst.mean();
   const double sd = std::sqrt((worst.array() - mean).square().mean());

@@ -48,6 +48,14 @@ class ScoreTest {
 
  private:
   struct Reduced;
+  /// Information, scores per cluster and score of the dictionary's columns beside the model.
+  struct ReducedDictionary {
+    Eigen::MatrixXd information, clusters;
+    Eigen::VectorXd score;
+  };
+  [[nodiscard]] ReducedDictionary reduced_dictionary() const;
+  [[nodiscard]] Finding finding_of(std::size_t hypothesis, const ReducedDictionary&, const Eigen::MatrixXd& flipped,
+                                   Eigen::VectorXd& worst) const;
   [[nodiscard]] Reduced reduce(const std::vector<Eigen::Index>& columns, int without_term, bool by_cluster) const;
   [[nodiscard]] Finding evidence_of(const Reduced&, const Eigen::VectorXd& scale, double log_choices) const;
 

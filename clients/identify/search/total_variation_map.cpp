@@ -9,6 +9,7 @@
 
 #include "clients/identify/search/total_variation_solver.hpp"
 #include "core/os/worker_pool.hpp"
+#include "core/stats/quantiles.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -129,11 +130,9 @@ NodeGrid grid_of(const PreparedSet& set) {
     }
   }
   const auto bounds = [](std::vector<double>& all, double& low, double& high) {
-    const auto few = static_cast<std::ptrdiff_t>(all.size() / 500);
-    std::nth_element(all.begin(), all.begin() + few, all.end());
-    low = all[static_cast<std::size_t>(few)] - 20;
-    std::nth_element(all.begin(), all.end() - 1 - few, all.end());
-    high = all[all.size() - 1 - static_cast<std::size_t>(few)] + 20;
+    const std::size_t few = all.size() / 500;
+    low = stats::order_statistic(all, few) - 20;
+    high = stats::upper_end(all, few) + 20;
   };
   bounds(xs, x_low, x_high);
   bounds(ys, y_low, y_high);

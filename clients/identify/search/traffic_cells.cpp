@@ -6,6 +6,7 @@
 
 #include "clients/identify/search/visits.hpp"
 #include "core/os/worker_pool.hpp"
+#include "core/stats/quantiles.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -108,9 +109,7 @@ GridCells fit_grid_cells(const Fitter& fitter, const FitState& state, const Grid
     for (const Instant& instant : run)
       for (const Visit& v : instant) away.push_back(std::max(std::abs(v.x_mm), std::abs(v.y_mm)));
   if (away.empty()) return from;
-  const auto most = away.end() - 1 - static_cast<std::ptrdiff_t>(away.size() / 50);
-  std::nth_element(away.begin(), most, away.end());
-  const double extent_mm = std::max<double>(*most, from.side_mm);
+  const double extent_mm = std::max<double>(stats::upper_end(away, away.size() / 50), from.side_mm);
   // Grid of the global search: sides so dense that the outermost cells still match, corners a third of a cell
   // apart.
   constexpr double kSmallest_mm = 14, kLargest_mm = 150;

@@ -125,6 +125,7 @@ void FastCore::forget(std::uint32_t address, std::uint32_t octets) {
   for (std::uint32_t i = first; i < last; ++i) (*operations_)[i] = Operation();
 }
 
+// NOLINTNEXTLINE(readability-function-size): one switch over the instruction set
 FastCore::Operation FastCore::decode(std::uint32_t pc) const {
   const std::uint32_t o = word(pc), next = pc + 2;
   const auto d5 = static_cast<std::uint8_t>(o >> 4 & 31), r5 = static_cast<std::uint8_t>((o >> 5 & 16) | (o & 15));
@@ -289,6 +290,7 @@ FastCore::Operation FastCore::decode(std::uint32_t pc) const {
   }
 }
 
+// NOLINTNEXTLINE(readability-function-size): one switch over the instruction set
 std::uint64_t FastCore::run(avr_t& avr, std::uint64_t cycles) {
   if (waiting_.loop) {
     if (inputs_are(avr, waiting_.loop->begin)) return skip(avr, cycles);

@@ -37,6 +37,7 @@ struct Form {
   Basis basis;
 };
 
+// NOLINTNEXTLINE(readability-function-size): a table
 std::vector<Form> forms() {
   Factor late = over(Shape::kCosines, Covariate::kSinceCommand, 0, 6, 4);
   late.warp = 1;

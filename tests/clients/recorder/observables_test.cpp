@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "clients/recorder/statistics.hpp"
+#include "core/stats/moments.hpp"
 #include "tests/clients/recorder/synthetic.hpp"
 #include "tests/clients/view/recordings.hpp"
 
@@ -23,7 +23,7 @@ TEST(Observables, OfARecordingOfStraightMotion) {
     const double t = std::array{0.0, 31.0, 62.0}[k];
     EXPECT_DOUBLE_EQ(curves.time_s[k], t * 0.032768);
     // Robot i starts at (10 i, -5 i) and moves by (0.5 t, 0.25 i t); its heading is 0.1 i.
-    Sample square, distance;
+    stats::Moments square, distance;
     for (const double i : {0.0, 1.0, 2.0}) {
       square.add(t * t * (0.25 + 0.0625 * i * i));
       distance.add(t * std::hypot(0.5, 0.25 * i));
@@ -113,7 +113,7 @@ TEST(Observables, NearestDistanceIsThatOfComparingAllPairs) {
       x.push_back(field.width_mm * (static_cast<double>(generator() % 1000) / 1000 - 0.5));
       y.push_back(field.height_mm * (static_cast<double>(generator() % 1000) / 1000 - 0.5));
     }
-    Sample expected;
+    stats::Moments expected;
     for (std::size_t i = 0; i < x.size(); ++i) {
       double best = INFINITY;
       for (std::size_t j = 0; j < x.size(); ++j) {

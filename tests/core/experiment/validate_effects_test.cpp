@@ -40,13 +40,13 @@ TEST_F(ValidateEffects, EpisodesNeedRateAndLength) {
       "or a drift");
 }
 
-struct Bad {
+struct BadEffect {
   const char* text;
   const char* error;
 };
 
 TEST_F(ValidateEffects, ErrorsNameTheirPlace) {
-  const Bad cases[] = {
+  const BadEffect cases[] = {
       {"effect { acts_on: WHEEL_GAIN function { constant: 1 } }",
        "e.txtpb:2:1: name is missing; state name: \"...\", one that no other effect has"},
       {"effect { name: 'a b' acts_on: WHEEL_GAIN function { constant: 1 } }",

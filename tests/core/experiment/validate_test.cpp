@@ -15,6 +15,7 @@ const std::string kGroup = "robots { count: 4 behaviour: 'a.c' }\n";
 
 TEST_F(Validate, AcceptsTheSmallestExperiment) { EXPECT_EQ(check_error(kGroup), ""); }
 
+// NOLINTNEXTLINE(readability-function-size): a table
 TEST_F(Validate, OneLineForEveryMistake) {
   const Bad cases[] = {
       // Ranges; each field's own are tested below.

@@ -4,7 +4,9 @@
 #include <vector>
 
 #include "core/stats/distributions.hpp"
+#include "core/stats/moments.hpp"
 #include "core/stats/quantiles.hpp"
+#include "core/stats/resampling.hpp"
 
 namespace kilotwin::stats {
 namespace {
@@ -18,6 +20,8 @@ TEST(Quantiles, OfFourValues) {
   EXPECT_EQ(upper_median(values), 3);
   EXPECT_EQ(lower_quantile(values, 0.5), 2);
   EXPECT_EQ(lower_quantile(values, 1), 4);
+  EXPECT_EQ(nearest_quantile(values, 0.4), 2);
+  EXPECT_EQ(nearest_quantile(values, 0.6), 3);
   EXPECT_EQ(interpolated_quantile(values, 0.5), 2.5);
   EXPECT_NEAR(interpolated_quantile(values, 0.9), 3.7, 1e-15) << "numpy.quantile([1, 2, 3, 4], 0.9)";
 }
@@ -27,6 +31,38 @@ TEST(Quantiles, OfNothing) {
   EXPECT_EQ(upper_median(none), 0);
   EXPECT_EQ(lower_quantile(none, 0.5), 0);
   EXPECT_TRUE(std::isnan(interpolated_quantile(none, 0.5)));
+}
+
+TEST(Moments, MeanAndStandardError) {
+  Moments sample;
+  EXPECT_EQ(sample.mean(), 0);
+  EXPECT_EQ(sample.standard_error(), 0);
+  sample.add(3);
+  EXPECT_EQ(sample.mean(), 3);
+  EXPECT_EQ(sample.standard_error(), 0);
+  for (const double value : {5.0, 7.0, 9.0}) sample.add(value);
+  EXPECT_EQ(sample.count(), 4u);
+  EXPECT_DOUBLE_EQ(sample.mean(), 6);
+  EXPECT_DOUBLE_EQ(sample.standard_deviation(), std::sqrt(20.0 / 3));
+  EXPECT_DOUBLE_EQ(sample.standard_error(), std::sqrt(20.0 / 3) / 2);
+}
+
+TEST(Moments, HasNoCancellation) {
+  Moments sample;
+  for (const double value : {1e9 + 4, 1e9 + 7, 1e9 + 13, 1e9 + 16}) sample.add(value);
+  EXPECT_DOUBLE_EQ(sample.standard_deviation() * sample.standard_deviation(), 30);
+}
+
+TEST(Resampling, CountsDrawsAndPermutes) {
+  const std::vector<double> weights = bootstrap_weights(4, [](std::size_t i) { return i / 2; });
+  EXPECT_EQ(weights, (std::vector<double>{2, 2, 0, 0}));
+  std::vector<int> items{0, 1, 2, 3};
+  permute(
+      items.size(), [](std::size_t) { return 0u; },
+      [&](std::size_t i, std::size_t j) { std::swap(items[i], items[j]); });
+  EXPECT_EQ(items, (std::vector<int>{1, 2, 3, 0}));
+  EXPECT_EQ(permutation_p(0, 999), 0.001);
+  EXPECT_EQ(permutation_p(999, 999), 1);
 }
 
 TEST(Distributions, AgreeWithTables) {

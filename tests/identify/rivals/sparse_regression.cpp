@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 
+#include "core/stats/moments.hpp"
 #include "tests/identify/rivals/columns.hpp"
 #include "tests/identify/truth/dice.hpp"
 
@@ -102,6 +103,33 @@ double error_of(const Gram& g, int response, const Eigen::VectorXd& b) {
   return g.yy[response] - 2 * b.dot(g.xy.col(response)) + b.dot(g.xx * b);
 }
 
+/// The largest threshold within a tenth of a standard error of the best in a cross-validation over tracks. `sd`: of the
+/// residual of the base columns.
+double threshold_of(const std::vector<Gram>& tracks, int response, const Eigen::VectorXd& spread, Eigen::Index base,
+                    double sd) {
+  constexpr double kThresholds[] = {0.01, 0.02, 0.04, 0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 1e9};
+  constexpr std::size_t kFolds = 6;
+  const Gram none{Eigen::MatrixXd::Zero(spread.size(), spread.size()), Eigen::MatrixXd::Zero(spread.size(), 3)};
+  double means_of[std::size(kThresholds)], se_of_best = 0, best = INFINITY;
+  for (std::size_t t = 0; t < std::size(kThresholds); ++t) {
+    stats::Moments errors;
+    for (std::size_t fold = 0; fold < kFolds; ++fold) {
+      Gram train = none, test = none;
+      for (std::size_t i = 0; i < tracks.size(); ++i) (i % kFolds == fold ? test : train) += tracks[i];
+      const Eigen::VectorXd b = thresholded(train, response, spread, base, kThresholds[t] * sd);
+      errors.add(error_of(test, response, b) / std::max(test.rows, 1.0));
+    }
+    means_of[t] = errors.mean();
+    if (means_of[t] >= best) continue;
+    best = means_of[t];
+    se_of_best = errors.standard_error();
+  }
+  double threshold = kThresholds[0];
+  for (std::size_t t = 0; t < std::size(kThresholds); ++t)
+    if (means_of[t] <= best + 0.1 * se_of_best) threshold = kThresholds[t];
+  return threshold * sd;
+}
+
 }  // namespace
 
 Rival sparse_regression(const std::vector<RateRow>& rows, int robots) {
@@ -136,30 +164,8 @@ Rival sparse_regression(const std::vector<RateRow>& rows, int robots) {
   std::set<std::string> found;
   Dice dice(20220801);
   for (int k = 0; k < 3; ++k) {
-    // The threshold, in standard deviations of the residual: the largest within a standard error of the best in a
-    // cross-validation over tracks.
-    const double sd = std::sqrt(error_of(all, k, thresholded(all, k, spread, base, 1e9)) / all.rows);
-    constexpr double kThresholds[] = {0.01, 0.02, 0.04, 0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 1e9};
-    constexpr std::size_t kFolds = 6;
-    double means_of[std::size(kThresholds)], se_of_best = 0, best = INFINITY;
-    for (std::size_t t = 0; t < std::size(kThresholds); ++t) {
-      double sum = 0, squares = 0;
-      for (std::size_t fold = 0; fold < kFolds; ++fold) {
-        Gram train = none, test = none;
-        for (std::size_t i = 0; i < tracks.size(); ++i) (i % kFolds == fold ? test : train) += tracks[i];
-        const double error =
-            error_of(test, k, thresholded(train, k, spread, base, kThresholds[t] * sd)) / std::max(test.rows, 1.0);
-        sum += error;
-        squares += error * error;
-      }
-      means_of[t] = sum / kFolds;
-      if (means_of[t] >= best) continue;
-      best = means_of[t];
-      se_of_best = std::sqrt(std::max(0.0, squares / kFolds - best * best) / (kFolds - 1));
-    }
-    double threshold = kThresholds[0];
-    for (std::size_t t = 0; t < std::size(kThresholds); ++t)
-      if (means_of[t] <= best + 0.1 * se_of_best) threshold = kThresholds[t];
+    const double threshold = threshold_of(
+        tracks, k, spread, base, std::sqrt(error_of(all, k, thresholded(all, k, spread, base, 1e9)) / all.rows));
     // The ensemble: tracks drawn with replacement. A term stays if 60 % of the members have it.
     constexpr int kMembers = 60;
     constexpr double kIncluded = 0.6;
@@ -168,7 +174,7 @@ Rival sparse_regression(const std::vector<RateRow>& rows, int robots) {
       Gram drawn = none;
       for (std::size_t i = 0; i < tracks.size(); ++i)
         drawn += tracks[static_cast<std::size_t>(dice.pick(static_cast<int>(tracks.size())))];
-      const Eigen::VectorXd b = thresholded(drawn, k, spread, base, threshold * sd);
+      const Eigen::VectorXd b = thresholded(drawn, k, spread, base, threshold);
       for (Eigen::Index i = 0; i < columns; ++i) held[i] += b[i] != 0 ? 1.0 / kMembers : 0;
     }
     std::vector<Eigen::Index> active;

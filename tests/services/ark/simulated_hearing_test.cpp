@@ -91,7 +91,7 @@ TEST(SimulatedHearing, WithoutABlockNobodyHears) {
 }
 
 /// The messages of a station over some ticks in which robot 1 sends all the time, by the time at which they leave.
-std::map<double, ArkMessage> messages_of(StationEngine& station, Hall& hall, Tick& now, std::int64_t ticks) {
+std::map<double, ArkMessage> messages_to(StationEngine& station, Hall& hall, Tick& now, std::int64_t ticks) {
   std::map<double, ArkMessage> messages;
   for (const Tick end = now + ticks; now < end; ++now) {
     SwarmView& swarm = hall.send({1});
@@ -114,7 +114,7 @@ TEST(SimulatedHearing, MessagesKeepTheIntervalOfARobotAndSurviveACheckpoint) {
   Hall hall("type: 7 data: SENDER", "station { robot_interval_s: 0.4 }");
   StationEngine station(hall.plan, {});
   Tick now;
-  const auto messages = messages_of(station, hall, now, 300);
+  const auto messages = messages_to(station, hall, now, 300);
   ASSERT_GT(messages.size(), 20u);
   double last_s = -1;
   for (const auto& [time_s, message] : messages) {
@@ -129,7 +129,7 @@ TEST(SimulatedHearing, MessagesKeepTheIntervalOfARobotAndSurviveACheckpoint) {
   resumed.load(now, std::span(&part, 1));
   EXPECT_EQ(resumed.hash_part(), station.hash_part());
   Tick again = now;
-  EXPECT_EQ(messages_of(resumed, hall, again, 100), messages_of(station, hall, now, 100));
+  EXPECT_EQ(messages_to(resumed, hall, again, 100), messages_to(station, hall, now, 100));
   EXPECT_EQ(resumed.hash_part(), station.hash_part());
 }
 

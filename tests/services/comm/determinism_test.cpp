@@ -54,12 +54,12 @@ void expect_equal(const RadioFrame& a, const RadioFrame& b) {
   ASSERT_EQ(a.message_crc_error, b.message_crc_error);
 }
 
-constexpr std::uint32_t kRobots = 150;
+constexpr std::uint32_t kDividedRobots = 150;
 
 RunPlan crowd_plan(const std::string& experiment, std::uint32_t columns = 1, std::uint32_t rows = 1,
                    std::uint32_t hosts = 1) {
   return make_plan(experiment + " arena { width_mm: 900 height_mm: 900 } recording { messages: true }",
-                   testing::random_crowd(kRobots, 800, 800, 33, 7), columns, rows, hosts);
+                   testing::random_crowd(kDividedRobots, 800, 800, 33, 7), columns, rows, hosts);
 }
 
 /// Robots cross borders, change their motors, sleep and wake; the overhead controller sends packets now and then. A pure
@@ -67,7 +67,7 @@ RunPlan crowd_plan(const std::string& experiment, std::uint32_t columns = 1, std
 void stir(testing::FakeHosts& hosts, Tick now) {
   std::mt19937_64 random(static_cast<std::uint64_t>(now.count()) * 7919 + 1);
   const auto draw = [&](std::uint64_t n) { return random() % n; };
-  for (std::uint32_t i = 0; i < kRobots; ++i) {
+  for (std::uint32_t i = 0; i < kDividedRobots; ++i) {
     hosts.poses[i].x_mm += static_cast<double>(draw(9)) - 4;
     hosts.poses[i].y_mm += static_cast<double>(draw(9)) - 4;
     if (draw(50) == 0) hosts.sends[i] ^= 1;
@@ -205,8 +205,8 @@ TEST(Fuzz, CountsAreConsistent) {
                    " radio { range_mm: " + std::to_string(40 + 30 * round) + " oscillator_sd: 0.05 } ");
     Swarm swarm(plan);
     std::mt19937_64 random(round);
-    std::vector<std::vector<IrMessage>> given(kRobots);
-    std::vector<std::size_t> reported(kRobots, 0);
+    std::vector<std::vector<IrMessage>> given(kDividedRobots);
+    std::vector<std::size_t> reported(kDividedRobots, 0);
     swarm.hosts.message = [&](std::uint32_t robot, Tick) {
       IrMessage message;
       for (std::uint8_t& octet : message) octet = static_cast<std::uint8_t>(random());
@@ -220,7 +220,7 @@ TEST(Fuzz, CountsAreConsistent) {
       stir(swarm.hosts, swarm.now);
       swarm.step();
       const RadioFrame& frame = swarm.frames[0];
-      ASSERT_EQ(frame.kilo_ticks.size(), kRobots);
+      ASSERT_EQ(frame.kilo_ticks.size(), kDividedRobots);
       ASSERT_TRUE(std::is_sorted(frame.reception_robot.begin(), frame.reception_robot.end()));
       ASSERT_TRUE(std::adjacent_find(frame.ask.begin(), frame.ask.end(), std::greater_equal<>()) ==
                   frame.ask.end());
@@ -240,7 +240,7 @@ TEST(Fuzz, CountsAreConsistent) {
       const auto& c = swarm.radio.counters();
       ASSERT_EQ(c.received, received);
       ASSERT_LE(c.sent + c.aborted, c.attempted);
-      ASSERT_LE(c.attempted - c.sent - c.aborted, kRobots);
+      ASSERT_LE(c.attempted - c.sent - c.aborted, kDividedRobots);
     }
     EXPECT_GT(swarm.radio.counters().sent, 100u);
   }

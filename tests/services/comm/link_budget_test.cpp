@@ -24,8 +24,8 @@ std::string radio(const std::string& propagation) {
   return "radio { model: PROPAGATION range_mm: 100 oscillator_sd: 0 propagation { " + propagation + " } }";
 }
 
-struct Air {
-  explicit Air(const RunPlan& plan) : links(plan), robots(links.reach_mm(), links.span_mm(), plan.robots()) {
+struct Medium {
+  explicit Medium(const RunPlan& plan) : links(plan), robots(links.reach_mm(), links.span_mm(), plan.robots()) {
     for (std::uint32_t i = 0; i < plan.robots(); ++i) {
       const Pose pose = plan.initial_pose(i);
       robots.place(i, pose.x_mm, pose.y_mm);
@@ -42,7 +42,7 @@ struct Air {
 
 TEST(LinkBudget, MarginDecreasesWithDistance) {
   const RunPlan plan = make_plan(radio(kNominal), {{0, 0, 0}, {60, 80, 0}, {0, -40, 0}});
-  Air air(plan);
+  Medium air(plan);
   EXPECT_NEAR(air.margin(0, 1), 0, 1e-12);
   EXPECT_NEAR(air.margin(0, 2), 6, 1e-12);
   EXPECT_EQ(air.links.gains(6), Ranging().gains(40));
@@ -55,7 +55,7 @@ TEST(LinkBudget, AppliesParametersOfRobotsAndPairs) {
                       "robot { robot: 0 power_db: 1.5 sensitivity_db: -2 } robot { robot: 1 power_db: -1 } "
                       "link { sender: 1 receiver: 0 offset_db: 0.25 } link { sender: 0 receiver: 7 offset_db: 9 }"),
                 {{0, 0, 0}, {50, 0, 0}});
-  Air air(plan);
+  Medium air(plan);
   EXPECT_NEAR(air.margin(0, 1), 5 + 1.5, 1e-12);
   EXPECT_NEAR(air.margin(1, 0), 5 - 1 - 2 + 0.25, 1e-12);
 }
@@ -67,7 +67,7 @@ TEST(LinkBudget, MarginDependsOnTheBearing) {
   for (int k = 0; k < 12; ++k) poses.push_back({50 * std::cos(k * turn), 50 * std::sin(k * turn), 1.0 * k});
   const RunPlan plan = make_plan(
       radio(kNominal + "robot { robot: 0 power_ahead_db: 2 power_left_db: 1 sensitivity_left_db: -3 }"), poses);
-  Air air(plan);
+  Medium air(plan);
   for (std::uint32_t k = 0; k < 12; ++k) {
     const double bearing = k * turn - turn;
     EXPECT_NEAR(air.margin(0, k + 1), 5 + 2 * std::cos(bearing) + std::sin(bearing), 1e-9) << k;
@@ -79,7 +79,7 @@ TEST(LinkBudget, BodiesOnTheLineReduceTheMargin) {
   // Positions: on the line; half a radius beside it; more than a radius beside it; beyond the receiver.
   const RunPlan plan = make_plan(radio(kNominal + "body_loss_db: 2"),
                                  {{0, 0, 0}, {160, 0, 0}, {40, 0, 0}, {80, 8.25, 0}, {120, -17, 0}, {200, 0, 0}});
-  Air air(plan);
+  Medium air(plan);
   const double crossed = 1 + std::sqrt(0.75);
   EXPECT_NEAR(air.robots.bodies_between(0, 1, 16.5), crossed, 1e-12);
   EXPECT_NEAR(air.margin(0, 1), -6 - 2 * crossed, 1e-12);
@@ -93,7 +93,7 @@ TEST(LinkBudget, ShadowsDoNotDependOnThePosition) {
     std::vector<ScenePose> poses;
     for (int i = 0; i < 6; ++i) poses.push_back({x + 33.5 * i, x / 2, 0});
     const RunPlan plan = make_plan(radio(kNominal + "body_loss_db: 1"), poses);
-    Air air(plan);
+    Medium air(plan);
     EXPECT_NEAR(air.robots.bodies_between(0, 5, 16.5), 4, 1e-9) << x;
     EXPECT_NEAR(air.robots.bodies_between(4, 1, 16.5), 2, 1e-9) << x;
   }
@@ -114,7 +114,7 @@ std::vector<ScenePose> random_poses(std::uint32_t count, double side_mm) {
 TEST(LinkBudget, HearsWhereTheMarginIsAboveZero) {
   for (const std::string extra : {"", "body_loss_db: 3", "link { sender: 3 receiver: 4 offset_db: 40 }"}) {
     const RunPlan plan = make_plan(radio(extra), random_poses(150, 800));
-    Air air(plan);
+    Medium air(plan);
     std::uint32_t heard = 0;
     for (std::uint32_t a = 0; a < 150; ++a) {
       for (std::uint32_t b = 0; b < 150; ++b) {
@@ -143,7 +143,7 @@ TEST(LinkBudget, SpreadsMatchTheModel) {
       make_plan(radio("decay_db_per_mm: 0.1 power_sd_db: 1 sensitivity_sd_db: 2 power_bearing_sd_db: 0.5 "
                       "sensitivity_bearing_sd_db: 0.25 link_sd_db: 0.75"),
                 poses);
-  Air air(plan);
+  Medium air(plan);
   double sum = 0, squares = 0;
   for (std::uint32_t i = 0; i < kPairs; ++i) {
     const double deviation = air.margin(2 * i, 2 * i + 1) - 5;

@@ -13,13 +13,13 @@ namespace {
 using testing::make_plan;
 using testing::Swarm;
 
-constexpr Cycles kTick = 262144;
+constexpr Cycles kTickCycles = 262144;
 constexpr Cycles kPeriod = 83272;
 const IrMessage kWord{1, 2, 3, 4, 5, 6, 7, 8, 9, 0x88};
 
 /// Copies that have arrived before the end of tick `ticks` - 1 if the first one starts at tick `first`.
 std::int64_t copies_until(std::int64_t first, std::int64_t ticks) {
-  const Cycles last_start = (ticks - first) * kTick - 1 - kPacket;
+  const Cycles last_start = (ticks - first) * kTickCycles - 1 - kPacket;
   return last_start < 0 ? 0 : last_start / kPeriod + 1;
 }
 
@@ -103,7 +103,7 @@ TEST(Overhead, PacketsActAtTheirOffsets) {
   std::vector<IrMessage> messages;
   const std::vector<OverheadPacket> at_offsets{packet(OverheadCommand::kRepeat, 1, 10'000),
                                                packet(OverheadCommand::kRepeat, 2, 10'000 + kPeriod + 1),
-                                               packet(OverheadCommand::kOnce, 3, kTick - kPacket)};
+                                               packet(OverheadCommand::kOnce, 3, kTickCycles - kPacket)};
   // 1 starts at its offset, and again a period later, just before packet 2 comes; 2 and 3 follow, each after a period. The
   // last one starts 2328 cycles before the tick's end and ends in the next.
   EXPECT_EQ(heard_after(at_offsets, 3, &messages), (std::vector<std::size_t>{3, 1, 0}));
@@ -121,7 +121,7 @@ TEST(Overhead, PacketsActAtTheirOffsets) {
             (std::vector<std::size_t>{2, 0}));
   // A copy that starts in the last cycle of a tick arrives in the next one.
   messages.clear();
-  EXPECT_EQ(heard_after({packet(OverheadCommand::kOnce, 7, kTick - 1)}, 2, &messages),
+  EXPECT_EQ(heard_after({packet(OverheadCommand::kOnce, 7, kTickCycles - 1)}, 2, &messages),
             (std::vector<std::size_t>{0, 1}));
 }
 
@@ -156,8 +156,9 @@ TEST(Overhead, APageIsTwentyTwoMessagesBackToBack) {
   for (std::size_t i = 0; i < 128; ++i) EXPECT_EQ(page[i], static_cast<std::uint8_t>(i * 7 + 17));
   // Message n ends (n + 1) packets and n gaps after the start; 20 ms after the 22nd, the next packet's message begins.
   std::vector<std::size_t> expected(6, 0);
-  for (Cycles n = 0; n < 22; ++n) ++expected[static_cast<std::size_t>((n * (kPacket + 302) + kPacket) / kTick)];
-  ++expected[static_cast<std::size_t>((22 * (kPacket + 302) + 160'000 + kPacket) / kTick)];
+  for (Cycles n = 0; n < 22; ++n)
+    ++expected[static_cast<std::size_t>((n * (kPacket + 302) + kPacket) / kTickCycles)];
+  ++expected[static_cast<std::size_t>((22 * (kPacket + 302) + 160'000 + kPacket) / kTickCycles)];
   EXPECT_EQ(heard, expected);
   EXPECT_NEAR(22.0 * (kPacket + 302) / kNominalClockHz, 0.097, 0.001);
 }
@@ -283,7 +284,7 @@ TEST(Overhead, JamsRobotsAsThePhasesSay) {
       fate.push_back(kGivenUp);
     else
       fate.push_back(kDrowned);
-    due.push_back((start + kPacket) / kTick + 1);
+    due.push_back((start + kPacket) / kTickCycles + 1);
     ++number[fate.back()];
   }
   for (const int n : number) EXPECT_GT(n, 10);
@@ -322,10 +323,10 @@ TEST(Overhead, InterruptsAcrossTheBorderOfTicks) {
   for (std::uint64_t seed = 1; seed <= 2000; ++seed) {
     const RunPlan plan = make_plan("radio { oscillator_sd: 0 } seed: " + std::to_string(seed), {{0, 0, 0}});
     const TickTimers timers(plan);
-    const Cycles start = timers.next(0) + 15 * timers.period(0), border = (start / kTick + 1) * kTick;
+    const Cycles start = timers.next(0) + 15 * timers.period(0), border = (start / kTickCycles + 1) * kTickCycles;
     if (border - start >= kListening) continue;
     Swarm swarm(plan);
-    while (swarm.now.count() < border / kTick) swarm.step();
+    while (swarm.now.count() < border / kTickCycles) swarm.step();
     swarm.hosts.overhead.packets = {{OverheadCommand::kOnce, kWord}};
     swarm.step();
     const bool noticed = border - start >= kDeaf;

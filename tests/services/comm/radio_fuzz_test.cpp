@@ -11,7 +11,7 @@
 namespace kilotwin::comm {
 namespace {
 
-constexpr std::uint32_t kRobots = 40;
+constexpr std::uint32_t kFuzzedRobots = 40;
 
 struct Case {
   const char* radio;
@@ -25,7 +25,7 @@ TEST_P(RadioFuzz, CountsAreConsistent) {
   std::mt19937_64 random(GetParam().seed);
   const auto below = [&](std::uint64_t n) { return random() % n; };
   std::vector<testing::ScenePose> poses;
-  for (std::uint32_t i = 0; i < kRobots; ++i)
+  for (std::uint32_t i = 0; i < kFuzzedRobots; ++i)
     poses.push_back(
         {static_cast<double>(below(400)), static_cast<double>(below(400)), 0.01 * static_cast<double>(below(700))});
   const RunPlan plan = testing::make_plan(GetParam().radio, poses);
@@ -45,13 +45,13 @@ TEST_P(RadioFuzz, CountsAreConsistent) {
   std::uint64_t receptions = 0;
   for (int k = 0; k < 600; ++k) {
     for (int n = 0; n < 3; ++n) {
-      const auto robot = static_cast<std::uint32_t>(below(kRobots));
+      const auto robot = static_cast<std::uint32_t>(below(kFuzzedRobots));
       swarm.hosts.tx_period[robot] =
           below(2) == 0 ? kPeriods[below(kPeriods.size())] : static_cast<std::uint16_t>(below(65536));
       swarm.hosts.sends[robot] = below(8) != 0;
       if (below(10) == 0) swarm.hosts.life_cycle[robot] = static_cast<std::uint8_t>(lives[below(lives.size())]);
       // Positions that coincide, or lie outside the arena.
-      if (below(20) == 0) swarm.hosts.poses[robot] = swarm.hosts.poses[below(kRobots)];
+      if (below(20) == 0) swarm.hosts.poses[robot] = swarm.hosts.poses[below(kFuzzedRobots)];
       if (below(50) == 0) swarm.hosts.poses[robot].x_mm = below(2) == 0 ? 1e6 : -1e9;
       if (below(10) == 0)
         swarm.hosts.poses[robot] = {static_cast<double>(below(400)), static_cast<double>(below(400)), 0};
@@ -77,7 +77,7 @@ TEST_P(RadioFuzz, CountsAreConsistent) {
     receptions += frame.reception_robot.size();
     const auto& c = swarm.radio.counters();
     ASSERT_LE(c.sent + c.aborted, c.attempted);
-    ASSERT_LE(c.attempted, c.sent + c.aborted + kRobots);
+    ASSERT_LE(c.attempted, c.sent + c.aborted + kFuzzedRobots);
     if (k % 100 != 50) continue;
     // A restored engine continues like the saved one.
     proto::RadioState saved;

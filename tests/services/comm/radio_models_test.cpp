@@ -138,14 +138,14 @@ struct Air {
   Neighbourhood robots;
 };
 
-const std::string kExact =
+const std::string kExactClocks =
     "decay_db_per_mm: 0.1 power_sd_db: 0 sensitivity_sd_db: 0 power_bearing_sd_db: 0 sensitivity_bearing_sd_db: 0 "
     "packet_sd_db: 0 ";
 
 /// Only parameters that `model` states have random values.
 std::string propagation(const std::string& model) {
   const std::string link = model.find("link_sd_db") == std::string::npos ? "link_sd_db: 0 " : "";
-  return "radio { model: PROPAGATION range_mm: 100 propagation { " + kExact + link + model + " } }";
+  return "radio { model: PROPAGATION range_mm: 100 propagation { " + kExactClocks + link + model + " } }";
 }
 
 TEST(LinkBudget, AppliesTheCommonPattern) {

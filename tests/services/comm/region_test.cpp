@@ -12,7 +12,7 @@
 namespace kilotwin::comm {
 namespace {
 
-constexpr std::uint32_t kRobots = 300;
+constexpr std::uint32_t kCrowd = 300;
 constexpr double kWide_mm = 2400, kHigh_mm = 300;
 
 /// A reception: receiver, message, readings.
@@ -63,7 +63,7 @@ TEST_P(Regions, SumToTheUndividedChannel) {
     return random.uniform(Stream::kLayout, robot, Tick{tick}, number);
   };
   std::vector<testing::ScenePose> poses;
-  for (std::uint32_t i = 0; i < kRobots; ++i)
+  for (std::uint32_t i = 0; i < kCrowd; ++i)
     poses.push_back({kWide_mm * (draw(i, 0, 0) - 0.5), kHigh_mm * (draw(i, 0, 1) - 0.5), 6 * draw(i, 0, 2)});
   const RunPlan plan = testing::make_plan(radio, poses);
   testing::FakeHosts hosts(plan);
@@ -88,7 +88,7 @@ TEST_P(Regions, SumToTheUndividedChannel) {
       parts[to]->step(now, {inputs.swarm, inputs.overhead, others});
     }
     hosts.overhead.packets.clear();
-    Seen all(kRobots), split(kRobots);
+    Seen all(kCrowd), split(kCrowd);
     RadioFrame frame;
     whole.emit(HostId{0}, frame);
     all.add(whole, frame);
@@ -103,7 +103,7 @@ TEST_P(Regions, SumToTheUndividedChannel) {
     ASSERT_EQ(split.counters.collided, all.counters.collided) << now.count();
     ASSERT_EQ(split.counters.attempted, all.counters.attempted) << now.count();
     hosts.answer(now, HostId{0}, all.frame());
-    for (std::uint32_t i = 0; i < kRobots; ++i) {
+    for (std::uint32_t i = 0; i < kCrowd; ++i) {
       const bool was = hosts.poses[i].x_mm < 0;
       hosts.poses[i].x_mm += 8 * (draw(i, 1 + static_cast<int>(now.count()), 0) - 0.5);
       hosts.poses[i].y_mm += 8 * (draw(i, 1 + static_cast<int>(now.count()), 1) - 0.5);

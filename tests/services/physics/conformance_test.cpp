@@ -18,8 +18,8 @@ using testing::make_plan;
 using testing::ScenePose;
 using testing::Swarm;
 
-constexpr double kTick_s = 0.032768;
-const std::string kQuiet = " motion { noise: false }";
+using testing::kQuiet;
+using testing::kTick_s;
 
 struct Tested {
   const char* name;
@@ -50,14 +50,6 @@ class Conformance : public ::testing::TestWithParam<Tested> {
 
 INSTANTIATE_TEST_SUITE_P(Engines, Conformance, ::testing::ValuesIn(kEngines),
                          [](const auto& tested) { return std::string(tested.param.name); });
-
-/// Motors that change from time to time: most run straight or turn, some rest.
-void drive(Swarm& swarm, std::uint32_t robots, std::uint32_t tick) {
-  for (std::uint32_t r = 0; r < robots; ++r) {
-    const std::uint32_t phase = (r * 2654435761u + tick / 40 * 40503u) >> 7 & 7;
-    swarm.set_motors(r, phase < 5 ? 70 : 0, phase < 4 || phase == 6 ? 70 : 0);
-  }
-}
 
 double distance_mm(const ScenePose& a, const ScenePose& b) { return std::hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm); }
 

@@ -15,8 +15,8 @@ using testing::make_plan;
 using testing::ScenePose;
 using testing::Swarm;
 
-constexpr double kTick_s = 0.032768;
-const std::string kQuiet = "motion { noise: false } ";
+using testing::kQuiet;
+using testing::kTick_s;
 
 TEST(Contact, HeadOnRobotsStopWhereTheyMeet) {
   const RunPlan plan = make_plan(kQuiet, {{-30, 0, 0}, {30, 0, kPi}});

@@ -14,7 +14,8 @@ using testing::make_plan;
 using testing::ScenePose;
 using testing::Swarm;
 
-constexpr double kAxleOffset_mm = 9.2, kWheelBase_mm = 25, kTick_s = 0.032768;
+using testing::kTick_s;
+constexpr double kAxleOffset_mm = 9.2, kWheelBase_mm = 25;
 
 ScenePose axle_of(const ScenePose& p) {
   return {p.x_mm - kAxleOffset_mm * std::cos(p.heading_rad), p.y_mm - kAxleOffset_mm * std::sin(p.heading_rad),

@@ -68,11 +68,8 @@ std::string everything() {
 }
 
 void drive(Swarm& swarm, std::uint32_t tick) {
-  for (std::uint32_t r = 0; r < kRobots; ++r) {
-    const std::uint32_t phase = (r * 2654435761u + tick / 40 * 40503u) >> 7 & 7;
-    swarm.set_motors(r, phase < 5 ? 70 : 0, phase < 4 || phase == 6 ? 70 : 0);
-    if (tick % 40 == 0) swarm.kick(r);
-  }
+  drive(swarm, kRobots, tick);
+  for (std::uint32_t r = 0; tick % 40 == 0 && r < kRobots; ++r) swarm.kick(r);
 }
 
 /// Input before each step: a real robot that moves.

@@ -16,8 +16,10 @@ using testing::make_plan;
 using testing::ScenePose;
 using testing::Swarm;
 
-constexpr double kTick_s = 0.032768, kBase_mm = 25, kOffset_mm = 9.2;
-const std::string kQuiet = "motion { noise: false } ";
+using testing::kBase_mm;
+using testing::kOffset_mm;
+using testing::kQuiet;
+using testing::kTick_s;
 
 std::string effect(const std::string& what, const std::string& function) {
   return "effect { name: \"e\" " + what + " function { " + function + " } } ";

@@ -15,7 +15,7 @@ using testing::make_plan;
 using testing::ScenePose;
 using testing::Swarm;
 
-constexpr double kTick_s = 0.032768;
+using testing::kTick_s;
 constexpr double kGravity_mm_s2 = 9806.65;
 /// The experiment's defaults: friction of resting legs, and thrust over mass.
 constexpr double kFriction = 0.3, kThrust_mm_s2 = 1177;
@@ -103,13 +103,6 @@ TEST(OdeSlope, SlidingBodiesStopAtTheWall) {
   EXPECT_LE(testing::largest_overlap_mm(swarm.poses()), 0.1);
 }
 
-void drive(Swarm& swarm, std::uint32_t robots, std::uint32_t tick) {
-  for (std::uint32_t r = 0; r < robots; ++r) {
-    const std::uint32_t phase = (r * 2654435761u + tick / 40 * 40503u) >> 7 & 7;
-    swarm.set_motors(r, phase < 5 ? 70 : 0, phase < 4 || phase == 6 ? 70 : 0);
-  }
-}
-
 TEST(OdePartitions, SmallGroupsGiveTheSameBits) {
   const auto crowd = testing::random_crowd(60, 960, 960, 60, 3);
   const std::string text = "arena { width_mm: 1000 height_mm: 1000 } physics { engine: ODE }";
@@ -131,7 +124,7 @@ double rms_mm(const std::vector<ScenePose>& p, const std::vector<ScenePose>& q) 
   return std::sqrt(sum / static_cast<double>(p.size()));
 }
 
-struct Crowd {
+struct Gathering {
   const char* name;
   double pitch_mm;
   testing::Facing facing;
@@ -142,9 +135,9 @@ struct Crowd {
 // In a compressed crowd such differences grow like those of another seed. The test prints them for
 // docs/explanation/contact.md.
 TEST(OdePartitions, CutGroupsGiveSimilarResults) {
-  for (const Crowd& tested :
-       {Crowd{"that disperses from a 36 mm grid", 36, testing::Facing::kRandom, 8},
-        Crowd{"driven to its centre from a 33.5 mm grid", 33.5, testing::Facing::kInwards, 16}}) {
+  for (const Gathering& tested :
+       {Gathering{"that disperses from a 36 mm grid", 36, testing::Facing::kRandom, 8},
+        Gathering{"driven to its centre from a 33.5 mm grid", 33.5, testing::Facing::kInwards, 16}}) {
     const auto crowd = testing::grid_crowd(196, tested.pitch_mm, tested.facing);
     const std::string text =
         "motion { noise: false } arena { width_mm: 700 height_mm: 700 } physics { engine: ODE }";

@@ -30,14 +30,6 @@ void expect_same(const Swarm& a, const Swarm& b) {
   ASSERT_EQ(a.hash(), b.hash());
 }
 
-// Motors that change from time to time: a third runs straight, some turn, some rest.
-void drive(Swarm& swarm, std::uint32_t robots, std::uint32_t tick) {
-  for (std::uint32_t r = 0; r < robots; ++r) {
-    const std::uint32_t phase = (r * 2654435761u + tick / 40 * 40503u) >> 7 & 7;
-    swarm.set_motors(r, phase < 5 ? 70 : 0, phase < 4 || phase == 6 ? 70 : 0);
-  }
-}
-
 struct Case {
   std::uint64_t seed;
   std::uint32_t robots;

@@ -16,9 +16,9 @@ using testing::make_plan;
 using testing::ScenePose;
 using testing::Swarm;
 
-constexpr double kTick_s = 0.032768;
+using testing::kTick_s;
 constexpr std::int64_t k40_s = 1221;
-const std::string kQuiet = "motion { noise: false } ";
+using testing::kQuiet;
 const std::string kBox = "movable { box { width_mm: 100 length_mm: 100 } mass_g: 18 x_mm: 50 } ";
 const std::string kWide = "movable { box { width_mm: 100 length_mm: 300 } mass_g: 18 x_mm: 50 } ";
 

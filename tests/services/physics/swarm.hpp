@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "core/base/spin_up.hpp"
@@ -12,6 +13,11 @@
 #include "tests/support/scenes.hpp"
 
 namespace kilotwin::testing {
+
+inline constexpr double kTick_s = 0.032768;
+/// The default geometry of the drive: idl/model.proto.
+inline constexpr double kBase_mm = 25, kOffset_mm = 9.2;
+inline const std::string kQuiet = "motion { noise: false } ";
 
 /// Where a tracked robot is from now on.
 struct TrackedPlace {
@@ -153,6 +159,14 @@ inline double largest_overlap_mm(const std::vector<ScenePose>& poses) {
     }
   }
   return largest;
+}
+
+/// Motors that change from time to time: most run straight or turn, some rest.
+inline void drive(Swarm& swarm, std::uint32_t robots, std::uint32_t tick) {
+  for (std::uint32_t r = 0; r < robots; ++r) {
+    const std::uint32_t phase = (r * 2654435761u + tick / 40 * 40503u) >> 7 & 7;
+    swarm.set_motors(r, phase < 5 ? 70 : 0, phase < 4 || phase == 6 ? 70 : 0);
+  }
 }
 
 }  // namespace kilotwin::testing

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "clients/recorder/statistics.hpp"
+#include "core/stats/moments.hpp"
 #include "tests/validation/gallery/demos.hpp"
 
 namespace kilotwin::validation {
@@ -35,7 +35,7 @@ double nearest_mm(const DemoRun& run, std::size_t state, std::size_t robot) {
 void add_band(const DemoRun& run, std::size_t walker, double from_s, double least_mm, double most_mm,
               Verdicts& verdicts) {
   double least = HUGE_VAL, most = 0;
-  recorder::Sample mean;
+  stats::Moments mean;
   for (std::size_t k = 0; k < run.time_s.size(); ++k) {
     if (run.time_s[k] < from_s) continue;
     const double distance_mm = nearest_mm(run, k, walker);
@@ -82,7 +82,7 @@ void show_edge_follow(const DemoSettings& settings, Verdicts& verdicts) {
 void show_disperse(const DemoSettings& settings, Verdicts& verdicts) {
   constexpr double kNear_mm = 60;
   const DemoRun run = run_demo(settings, "disperse", {}, "disperse");
-  recorder::Sample first, last;
+  stats::Moments first, last;
   double alone = 0;
   for (std::size_t robot = 0; robot < run.robots(); ++robot) {
     first.add(nearest_mm(run, 0, robot));

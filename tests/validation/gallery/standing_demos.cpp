@@ -7,8 +7,8 @@
 #include <numbers>
 #include <set>
 
-#include "clients/recorder/statistics.hpp"
 #include "core/base/error.hpp"
+#include "core/stats/moments.hpp"
 #include "tests/validation/gallery/demos.hpp"
 
 namespace kilotwin::validation {
@@ -153,7 +153,7 @@ void show_firefly(const DemoSettings& settings, Verdicts& verdicts) {
 
 void show_morphogenesis(const DemoSettings& settings, Verdicts& verdicts) {
   const auto deviation = [](const DemoRun& run) {
-    recorder::Sample sample;
+    stats::Moments sample;
     for (const double value : run.values("activator")) sample.add(value);
     return sample.standard_deviation();
   };

@@ -1,26 +1,12 @@
-#include "clients/recorder/statistics.hpp"
+#include "clients/recorder/displacement.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "core/base/error.hpp"
+#include "core/stats/moments.hpp"
 
 namespace kilotwin::recorder {
-
-void Sample::add(double value) {
-  ++count_;
-  const double above = value - mean_;
-  mean_ += above / static_cast<double>(count_);
-  squares_ += above * (value - mean_);
-}
-
-double Sample::standard_deviation() const {
-  return count_ < 2 ? 0 : std::sqrt(squares_ / static_cast<double>(count_ - 1));
-}
-
-double Sample::standard_error() const {
-  return count_ < 2 ? 0 : standard_deviation() / std::sqrt(static_cast<double>(count_));
-}
 
 void DisplacementObserver::add(std::span<const double> x_mm, std::span<const double> y_mm) {
   if (start_x_mm_.empty()) {
@@ -28,9 +14,10 @@ void DisplacementObserver::add(std::span<const double> x_mm, std::span<const dou
     start_y_mm_.assign(y_mm.begin(), y_mm.end());
   }
   KILOTWIN_DEMAND(x_mm.size() == start_x_mm_.size() && y_mm.size() == start_y_mm_.size());
-  Sample distances;
+  stats::Moments distances;
   max_distance_mm_ = 0;
   for (std::size_t i = 0; i < x_mm.size(); ++i) {
+    if (i < left_out_.size() && left_out_[i] != 0) continue;
     if (i < left_out_.size() && left_out_[i] != 0) continue;
     const double dx = x_mm[i] - start_x_mm_[i], dy = y_mm[i] - start_y_mm_[i];
     const double distance = std::sqrt(dx * dx + dy * dy);
@@ -38,6 +25,11 @@ void DisplacementObserver::add(std::span<const double> x_mm, std::span<const dou
     max_distance_mm_ = std::max(max_distance_mm_, distance);
   }
   mean_distance_mm_ = distances.mean();
+}
+
+void DisplacementObserver::leave_out(std::size_t robot) {
+  if (left_out_.size() <= robot) left_out_.resize(robot + 1, 0);
+  left_out_[robot] = 1;
 }
 
 void DisplacementObserver::leave_out(std::size_t robot) {

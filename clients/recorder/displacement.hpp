@@ -1,4 +1,4 @@
-/// Statistics over runs or robots: means with standard errors, and displacements.
+/// Displacements of robots.
 #pragma once
 
 #include <cstddef>
@@ -7,22 +7,6 @@
 #include <vector>
 
 namespace kilotwin::recorder {
-
-/// Mean and standard deviation, updated per value (Welford 1962: no cancellation).
-class Sample {
- public:
-  void add(double value);
-  [[nodiscard]] std::size_t count() const { return count_; }
-  [[nodiscard]] double mean() const { return mean_; }  ///< 0 without values
-  /// With n - 1 in the denominator; 0 for fewer than two values.
-  [[nodiscard]] double standard_deviation() const;
-  /// Standard error of the mean: standard deviation / sqrt(n); 0 for fewer than two values.
-  [[nodiscard]] double standard_error() const;
-
- private:
-  std::size_t count_ = 0;
-  double mean_ = 0, squares_ = 0;
-};
 
 /// Distances of robots from their first recorded positions. Every state must have the same robots.
 class DisplacementObserver {
