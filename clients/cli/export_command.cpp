@@ -31,7 +31,7 @@ struct ExportArguments {
   bool measured = false;
 };
 
-/// What scripts need to know of a table's run.
+/// Facts about a table's run, for scripts.
 recorder::TableMetadata metadata_of(const recorder::RunDirectory& directory) {
   recorder::TableMetadata about;
   const recorder::Reader reader(directory.recording());

@@ -446,7 +446,7 @@ TEST_F(Deployments, DSimulatedRobotsMoveAmongThoseThatACameraSees) {
   world_run->wait(60);
   const World world(of_world.moments());
   const std::vector<Moment> seen = of_run.moments();
-  // Who is who is found once, by place, and stays so.
+  // Tracks are assigned to robots once, by place, and keep their robots.
   const auto begin = std::find_if(seen.begin(), seen.end(), [](const Moment& m) { return m.time_s >= kFrom_s; });
   ASSERT_NE(begin, seen.end());
   const std::vector<std::size_t> whose = nearest(world, *begin, kSimulated);

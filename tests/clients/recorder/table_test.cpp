@@ -103,7 +103,7 @@ assert about["seed"] == "7" and about["version"] == '1, "two"' and about["column
 )");
 }
 
-TEST_F(TableTest, AnArchiveOfManyColumnsStillSaysWhatTheyAre) {
+TEST_F(TableTest, AnArchiveOfManyColumnsStillNamesThem) {
   std::vector<Column> columns;
   for (int i = 0; i < 2000; ++i)
     columns.push_back({"variable_with_a_long_name_" + std::to_string(i), "mm", CellType::kInteger});
