@@ -21,7 +21,7 @@ add_custom_command(
 add_custom_target(manual ALL DEPENDS ${folder}/manual.stamp)
 install(DIRECTORY ${folder}/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
 
-# What Debian asks of every package.
+# Files that Debian requires of every package.
 execute_process(COMMAND date -u -R -d @${epoch} OUTPUT_VARIABLE date OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
 set(maintainer "The Kilotwin authors <kilotwin@localhost.localdomain>")
 file(WRITE ${folder}/changelog

@@ -27,9 +27,9 @@ struct Case {
 };
 
 std::string with_main(const std::string& text) {
-  return "#include <kilolib.h>\nvolatile int32_t sink;\nstatic uint8_t received, told;\n" + text +
+  return "#include <kilolib.h>\nvolatile int32_t sink;\nstatic uint8_t received, heard;\n" + text +
          "\nstatic void setup(void) {}\n"
-         "static void rx(message_t* m, distance_measurement_t* d) { ++told; if (m->type == 99) received = 1; }\n"
+         "static void rx(message_t* m, distance_measurement_t* d) { ++heard; if (m->type == 99) received = 1; }\n"
          "int main(void) { kilo_init(); kilo_message_rx = rx; kilo_start(setup, loop); return 0; }\n";
 }
 

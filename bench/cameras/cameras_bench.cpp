@@ -1,4 +1,4 @@
-// What a picture of the arena costs: 100 robots with lit LEDs, one big picture or ARK's four, on one thread.
+// The cost of a picture of the arena: 100 robots with lit LEDs, one big picture or ARK's four, on one thread.
 #include <benchmark/benchmark.h>
 
 #include <array>

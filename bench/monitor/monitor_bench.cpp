@@ -196,5 +196,10 @@ int main(int count, char** words) {
   for (const double gain : {-1.0, -0.5, -0.25}) motors(gain);
   for (const double size_mm : {1.0, 2.0, 5.0}) knocks(size_mm);
   for (const double gain : {-0.6, -0.3}) patches(gain, replicates);
+  fmt::print(
+      "\nA detection counts as named if the effect is the suspect or one of its alternatives. Other alarms are "
+      "those of "
+      "other robots, of\nother effects, or repeated. The delay of a patch includes the time until robots enter "
+      "it.\n");
   return 0;
 }

@@ -1,4 +1,4 @@
-// What a camera tracker gets wrong over minutes, in the terms of the station's camera model (station { camera { } }): a run's own
+// The errors of a camera tracker over minutes, in the terms of the station's camera model (station { camera { } }): a run's own
 // trajectories are rendered as pictures of ARK's scale and tracked. Usage: tracker_errors TRAJECTORIES.csv
 //
 // The table comes from `kilotwin export --trajectories --every 0.1`. bench/camera-model makes it, and writes the page.

@@ -45,7 +45,7 @@ class Arena {
   /// The packet reaches the overhead controller in the next step.
   void send(const OverheadPacket& packet);
 
-  /// The robot or movable body stands there after the next step, as in a run that is told so at this tick. Throws UserError where it
+  /// The robot or movable body stands there after the next step, as in a run with this request. Throws UserError where it
   /// cannot: no such body, a real robot, outside the arena, in an obstacle. `where.pose.heading_rad`: any angle.
   void place(const Relocation& where);
 
@@ -53,7 +53,7 @@ class Arena {
   /// NaN where the robot's program has no such variable, or it runs as firmware. Batteries, those of firmware robots included:
   /// core/observations/variable_sampler.hpp.
   [[nodiscard]] double variable(std::size_t index, std::uint32_t robot) const;
-  /// What sets a variable of a robot's program.
+  /// A new value for a variable of a robot's program.
   struct Write {
     std::uint32_t robot = 0;
     std::uint64_t address = 0;

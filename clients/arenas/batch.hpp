@@ -1,4 +1,4 @@
-/// Batch: arenas of one experiment, each with a seed of its own, on all threads. What they show lies in shared memory.
+/// Batch: arenas of one experiment, each with a seed of its own, on all threads. Their states lie in shared memory.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-/// What steers a run: the commands of `kilotwin control`, one by one or as lines of JSON.
+/// Requests that steer a run: the commands of `kilotwin control`, one by one or as lines of JSON.
 #pragma once
 
 #include <chrono>

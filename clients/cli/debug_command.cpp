@@ -37,7 +37,7 @@ struct DebugArguments : RunArguments {
   std::vector<std::string> commands;
 };
 
-/// What gdb does at the beginning: it learns where the robot's program lies in memory, and stops there for this robot alone.
+/// The first commands of gdb: it learns where the robot's program lies in memory, and stops there for this robot alone.
 std::string gdb_script(const DebugArguments& arguments, const RunPlan& plan,
                        const recorder::RunDirectory& directory, const behaviours::Program& program) {
   const auto address = program.slot(arguments.robot % behaviours::kSlots).image_address();

@@ -67,7 +67,7 @@ std::string other_duties_note(const recorder::OtherDuties& other) {
       other.changes, other.robots, other.robot, other.time_s, other.left, other.right);
 }
 
-/// What scripts need to know of a table's run.
+/// Facts about a table's run, for scripts.
 recorder::TableMetadata metadata_of(const recorder::RunDirectory& directory) {
   recorder::TableMetadata about;
   const recorder::Reader reader(directory.recording());

@@ -27,7 +27,7 @@ struct ImportArguments {
   bool force = false;
 };
 
-/// What is written: the experiment, then whatever belongs to it.
+/// The files to write: the experiment, then the files that belong to it.
 using Files = std::vector<std::pair<fs::path, std::string>>;
 
 void write_all(const Files& files, bool force) {

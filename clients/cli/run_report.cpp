@@ -336,7 +336,7 @@ void add_tracking(Data& page, const Summary& s) {
   page.set("tracking", tracking);
 }
 
-/// Who computed, and who waited for whom.
+/// Adds the table of times that federates computed, published and waited.
 void add_federates(Data& page, const Summary& s) {
   if (s.federates.empty()) return;
   html::Table table({"federate", "computes", "publishes", "waits", "share of waiting"});

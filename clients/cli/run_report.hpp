@@ -1,4 +1,4 @@
-/// What `kilotwin run` leaves for people: report.html.
+/// The report of a run, report.html.
 #pragma once
 
 #include <cstdint>

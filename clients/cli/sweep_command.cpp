@@ -54,7 +54,7 @@ std::vector<std::string> words_of(const SweepArguments& arguments, const SweepPo
                    run.directory);
 }
 
-/// What a sweep consists of.
+/// The parts of a sweep.
 struct Sweep {
   std::string name;
   std::vector<SweepPoint> points;

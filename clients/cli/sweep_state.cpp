@@ -52,7 +52,7 @@ void SweepContent::add(const Resolved& point) {
     if (!manifest.station_plugin(i).empty())
       files_[manifest.experiment().station().environment(i).plugin().source(0)].insert(manifest.station_plugin(i));
   }
-  // What differs between equal runs, and what programs decide.
+  // Fields that differ between equal runs, and fields that the programs decide.
   manifest.clear_run();
   manifest.clear_build();
   manifest.clear_program();

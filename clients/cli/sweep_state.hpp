@@ -1,4 +1,4 @@
-/// What a sweep has on disk, so that it can go on after an interruption.
+/// The state of a sweep on disk, so that it can go on after an interruption.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +14,7 @@ namespace kilotwin::cli {
 
 struct Resolved;
 
-/// What decides the results of a sweep's runs beside its words: contents of files, not their names.
+/// Contents of the files on which the results of a sweep's runs depend. Names of files do not count.
 class SweepContent {
  public:
   /// Adds a point as resolved.
@@ -32,7 +32,7 @@ class SweepContent {
   std::map<std::string, std::set<std::string>> files_;
 };
 
-/// What must be alike where a sweep goes on. Seeds may differ.
+/// Properties that must be equal if a sweep goes on. Seeds may differ.
 struct SweepPlan {
   std::filesystem::path experiment;
   std::vector<SweepPoint> points;

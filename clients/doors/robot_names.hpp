@@ -1,4 +1,4 @@
-/// Which robot of the experiment the other system means by a name or a number.
+/// The robot of the experiment that the other system means by a name or a number.
 #pragma once
 
 #include <cstdint>

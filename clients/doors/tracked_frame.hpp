@@ -1,4 +1,4 @@
-/// What a tracker saw in one frame, and the writer that publishes it as topic kilotwin/tracker_frames.
+/// The poses that a tracker measured in one frame, and the writer that publishes them as topic kilotwin/tracker_frames.
 #pragma once
 
 #include <cstdint>

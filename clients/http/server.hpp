@@ -21,7 +21,7 @@ namespace kilotwin::http {
 [[nodiscard]] std::string header_of(lws* connection, lws_token_indexes token);
 /// Whether the request has no `Origin`. Browsers always state the origin of a page that opens a WebSocket; other programs have none.
 [[nodiscard]] bool has_no_origin(lws* connection);
-/// What a callback returns to close a WebSocket with a reason.
+/// The value that a callback returns to close a WebSocket with a reason.
 [[nodiscard]] int closed(lws* connection, lws_close_status status, std::string reason);
 /// Adds a part of a WebSocket message to `message`. Returns whether the message is whole.
 [[nodiscard]] bool is_whole(lws* connection, std::string& message, std::string_view part);

@@ -23,7 +23,7 @@ constexpr double kAxleToCentre_mm =
     9.2;  ///< a robot's position in ARGoS is between its rear legs (the plugin's kilobot_entity)
 constexpr double kDefaultLight_m = 1;  ///< distance at which the laws of light are made to agree
 
-/// What is not worth a line, or why there is no counterpart.
+/// Why an element has no counterpart. Empty: the element needs no line.
 const std::map<std::string, std::string>& reasons() {
   static const std::map<std::string, std::string> all{
       {"system@threads", "give --threads with --mode local, or --partitions"},

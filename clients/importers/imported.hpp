@@ -20,7 +20,7 @@ struct PosesFile {
 struct Imported {
   proto::Experiment experiment;
   std::vector<PosesFile> poses;
-  /// What was not taken over as it is, with its line: "12: <floor>: ...". In the order of the file.
+  /// Settings that were not taken over as they are, each with its line: "12: <floor>: ...". In the order of the file.
   std::vector<std::string> notes;
 };
 

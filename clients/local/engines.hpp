@@ -1,4 +1,4 @@
-/// All engines of a run in this process, and the frames that they exchange. Whoever owns them decides when they step.
+/// All engines of a run in this process, and the frames that they exchange. Their owner decides when they step.
 #pragma once
 
 #include <cstdint>
@@ -33,7 +33,7 @@ class Engines {
     std::uint32_t firmware_threads = 1;
     bool keeps_firmware_logs = false;
   };
-  /// What is called once a host has stepped from a tick, on the thread on which it did.
+  /// Called once a host has stepped from a tick, on the thread of that step.
   using HostStepped = std::function<void(std::uint32_t host, Tick from)>;
 
   Engines(const RunPlan& plan, const std::shared_ptr<behaviours::ProgramSet>& programs, const Options& options);

@@ -1,4 +1,4 @@
-/// Which tracked robots may touch something that disturbs their motion.
+/// Finds tracked robots that may touch something that disturbs their motion.
 #pragma once
 
 #include <cstdint>

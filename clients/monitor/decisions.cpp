@@ -138,7 +138,7 @@ void Monitor::evaluate_robot(std::size_t i, Tick now) {
   }
   if (++notes.above < kConfirmRobot) return;
   notes.above = 0;
-  // What the robot met counts for the place first: several robots there have another cause than one robot.
+  // The robot's visit counts for the place first: several robots there have another cause than one robot.
   const std::size_t before = alarms_.size();
   end_visit(i);
   if (alarms_.size() > before) return;

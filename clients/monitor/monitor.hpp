@@ -65,7 +65,7 @@ class Monitor {
     Sums sums;
     std::uint32_t tracker = 0;
   };
-  /// What the monitor notes of a robot beside its filter.
+  /// State of a robot beside its filter.
   struct Notes {
     std::uint32_t above = 0;  ///< evaluations in a row with an evidence above the threshold
     std::uint32_t cell = 0;

@@ -17,7 +17,7 @@ struct NoiseTerm {
   std::vector<std::uint32_t> robots;  ///< ascending; empty: all
 };
 
-/// What slowly varying noise of the effects adds to the biases: their variance, and its growth per second.
+/// Contribution of slowly varying noise of the effects to the biases: variance, and its growth per second.
 struct BiasNoise {
   double variance_mm2_s2 = 0, growth_mm2_s3 = 0;
 };

@@ -43,7 +43,7 @@ class Places {
   std::optional<Patch> add(std::uint32_t cell, const Visit& visit, double dispersion, double threshold);
   /// A robot slowed down or sped up enough for an alarm of its own. Returns a patch if another robot did the same nearby before.
   std::optional<Patch> add_alarm(const Visit& visit, double dispersion);
-  /// What robots met near a known patch is a part of it.
+  /// Adds a place to the known patches: visits near a known patch belong to it.
   void extend(double x_mm, double y_mm) { known_.push_back({x_mm, y_mm}); }
   /// Forgets visits; known patches stay.
   void clear() {

@@ -15,7 +15,7 @@ struct Geometry {
   double wheel_base_mm = 0, axle_offset_mm = 0;
 };
 
-/// What is known of a bias before any measurement.
+/// Prior distribution of the biases.
 struct BiasPrior {
   double left_mm_s = 0, right_mm_s = 0;  ///< means
   double sd_mm_s = 0;

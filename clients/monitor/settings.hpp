@@ -1,4 +1,4 @@
-/// What a user may set of the monitor.
+/// Settings of the monitor that users may change.
 #pragma once
 
 #include "clients/monitor/station_commands.hpp"
@@ -12,7 +12,7 @@ struct MonitorSettings {
   double warm_up_s = 30;
   /// Standard deviation of the time at which a robot follows a change of its command.
   double command_jitter_s = 0.05;
-  /// What the station's messages command to robots that have neither a shadow program nor declared commands; empty: nothing.
+  /// Commands in the station's messages to robots that have neither a shadow program nor declared commands; empty: nothing.
   StationCommands station_commands{};
 };
 

@@ -1,4 +1,4 @@
-/// What the station commands: the meaning of its messages to robots, where that is motion. A real robot without a shadow program is
+/// Motion commands in the station's messages to robots. A real robot without a shadow program is
 /// then watched by what it was sent.
 #pragma once
 

@@ -33,7 +33,7 @@ class Experiment;
 
 namespace observe {
 
-/// What stays the same during a run.
+/// Facts that stay the same during a run.
 struct RunFacts {
   std::uint64_t run = 0;
   std::string name;

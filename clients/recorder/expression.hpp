@@ -24,7 +24,7 @@
 namespace kilotwin::recorder {
 
 enum class NameKind : std::uint8_t { kUnknown, kPerRobot, kSingle };
-/// What a name stands for.
+/// Returns the kind of value that a name stands for.
 using KindOfName = std::function<NameKind(const std::string& name)>;
 /// The values that names stand for: one per robot, or a single one. NaN: none.
 using NamedValues = std::function<const std::vector<double>&(const std::string& name)>;

@@ -1,4 +1,4 @@
-/// What the pictures of a run need of its recording, read in one pass.
+/// The data of a recording for the pictures of its run, read in one pass.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace kilotwin::recorder {
 
-/// What virtual environments have painted, by environment.
+/// The pictures that virtual environments have painted, by environment.
 using Floors = std::map<std::uint32_t, proto::FloorRecord>;
 
 struct RunOverview {

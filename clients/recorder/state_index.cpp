@@ -20,7 +20,7 @@ namespace {
 
 using google::protobuf::internal::WireFormatLite;
 
-/// What is read of a record: its frame's prefix, its kind and length, and its first two fields.
+/// The part of a record that is read: its frame's prefix, its kind and length, and its first two fields.
 constexpr std::size_t kRead_bytes = kFramePrefix_bytes + 36;
 /// Indices of variables and kinds of events beyond this are damage.
 constexpr std::size_t kMostLists = 4096;

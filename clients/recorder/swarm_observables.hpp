@@ -17,7 +17,7 @@
 
 namespace kilotwin::recorder {
 
-/// What a name in an expression stands for, where these variables are recorded.
+/// The kind of value that a name in an expression stands for, if these variables are recorded.
 [[nodiscard]] NameKind kind_of_name(const std::string& name, const std::vector<std::string>& variables);
 
 class SwarmObservables {

@@ -34,7 +34,7 @@ struct Column {
   int decimals = -1;  ///< in CSV, with kNumber; -1: the shortest text that gives the same number
 };
 
-/// What is written beside the rows: name and value. In .npz as JSON in the archive's comment, in .arrow in
+/// Data that is written beside the rows: name and value. In .npz as JSON in the archive's comment, in .arrow in
 /// the schema's metadata, beside a CSV file as FILE.json.
 using TableMetadata = std::vector<std::pair<std::string, std::string>>;
 

@@ -27,7 +27,7 @@ class TimedStates {
   [[nodiscard]] const Snapshot& after() const { return after_; }
   /// The tick of before().
   [[nodiscard]] std::int64_t tick() const { return before_tick_; }
-  /// What virtual environments had painted by before().
+  /// The pictures that virtual environments had painted by before().
   [[nodiscard]] const Floors& floors() const { return floors_; }
 
  private:

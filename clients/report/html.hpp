@@ -18,7 +18,7 @@ namespace kilotwin::html {
 
 /// Placeholder of a plot until it is drawn. Escaped text cannot contain it.
 [[nodiscard]] std::string mark_of(std::size_t plot);
-/// What an image stands on. Plots are transparent: a dark page inverts their ink. Pictures bring a light ground.
+/// The ground behind an image. Plots are transparent: a dark page inverts their ink. Pictures bring a light ground.
 enum class Ground { kPage, kOwn };
 /// An inline image.
 [[nodiscard]] std::string image(std::string_view svg, std::string_view alt, Ground ground = Ground::kPage);

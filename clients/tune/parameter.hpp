@@ -1,4 +1,4 @@
-/// What `kilotwin tune` varies: a field of an experiment or a constant of a program, with its range.
+/// A parameter that `kilotwin tune` varies: a field of an experiment or a constant of a program, with its range.
 #pragma once
 
 #include <string>

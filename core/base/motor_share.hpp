@@ -1,4 +1,4 @@
-/// Which duties a frame shows of a tick in which a program changed them.
+/// Chooses the duties that a frame shows of a tick in which a program changed them.
 #pragma once
 
 #include <algorithm>

@@ -22,7 +22,7 @@ struct Transport {
   std::vector<std::string> peers;
   /// The whole configuration, as CYCLONEDDS_URI has it, in place of what `peers` makes. Empty: what `peers` makes.
   std::string configuration = {};
-  /// USER_DATA of the participant: what other participants are told of it.
+  /// USER_DATA of the participant, which other participants receive.
   std::string user_data = {};
 };
 

@@ -1,4 +1,4 @@
-/// What a robot prints for a message that it hears, as `ListenerDoor.line` describes it: words, and numbers that fields in
+/// A robot's line for a message that it hears, as `ListenerDoor.line` describes it: words, and numbers that fields in
 /// braces stand for.
 #pragma once
 
@@ -10,7 +10,7 @@
 
 namespace kilotwin {
 
-/// What a line says; a field that the pattern lacks is absent.
+/// The values in a line. A field that the pattern lacks is absent.
 struct HeardLine {
   std::vector<std::uint8_t> data;  ///< 1 to 9 octets
   std::optional<std::uint8_t> type;
@@ -41,7 +41,7 @@ class LinePattern {
   std::vector<Part> parts_;
 };
 
-/// What is wrong with a pattern and what would be right, for people; empty: it is well.
+/// The error in a pattern and its correction, for people. Empty: no error.
 [[nodiscard]] std::string defect_of_line_pattern(std::string_view pattern);
 
 }  // namespace kilotwin

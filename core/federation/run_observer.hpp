@@ -29,7 +29,7 @@ struct RunProgress {
   std::string waiting_for;  ///< the federates for which the run waits, one line; empty if it does not wait
 };
 
-/// What a virtual environment of the station paints on the floor, for viewers: FloorRecord in idl/recording.proto.
+/// The picture that a virtual environment of the station paints on the floor, for viewers: FloorRecord in idl/recording.proto.
 struct FloorPicture {
   std::uint32_t environment = 0;
   std::uint32_t columns = 0, rows = 0;
@@ -63,7 +63,7 @@ class RunObserver {
   virtual void tracker_sample(Tick tick, const TrackerSample& sample) {
     static_cast<void>(tick), static_cast<void>(sample);
   }
-  /// What hosts, radio and station observed for the recording: variables and events. Those of a tick come before the state hash of
+  /// Observations of hosts, radio, station for the recording: variables and events. Those of a tick come before the state hash of
   /// the next tick but one.
   virtual void observed(const proto::Observations& observations) { static_cast<void>(observations); }
   /// A checkpoint is about to be complete. The recording up to its tick must be on disk when this returns.
@@ -75,7 +75,7 @@ class RunObserver {
 /// Categories of computing time.
 enum class Work : std::uint8_t { kBehaviours, kPhysics, kRadio, kStation, kExchange, kRecording, kCount };
 
-/// What the station sent for its virtual environments.
+/// Counts of messages and packets that the station sent for its virtual environments.
 struct StationTotals {
   std::uint64_t packets = 0, robot_messages = 0, broadcasts = 0;
   std::uint64_t replaced = 0,
@@ -102,7 +102,7 @@ struct TrackerReport {
   double way_p50_s = 0, way_p99_s = 0;  ///< writing to arrival, beyond the least delay
 };
 
-/// What the ingress and the station saw of tracked robots.
+/// Counts of the ingress and the station about tracked robots.
 struct TrackingTotals {
   std::vector<TrackerReport> trackers;
   /// From the arrival of a sample to the arrival of the poses on which it acted, s.

@@ -333,7 +333,7 @@ void Session::assemble(Federate& federate) {
 }
 
 /// Waits while the run is ahead of its pace. The wait lies before the frames are published, so that what
-/// arrives from outside meanwhile still counts for the tick. Nothing else is done shortly before the tick is due.
+/// arrives meanwhile still counts for the tick. Nothing else is done shortly before the tick is due.
 void Session::hold(Federate& federate, Tick now) {
   constexpr double kLongest_s = 1.0, kNear_s = 0.02;
   while (interrupted() == 0) {

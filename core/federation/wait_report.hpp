@@ -18,7 +18,7 @@ class WaitReport {
     since_ = now;
     cause_given_ = false;
   }
-  /// What is to be said now. It counts as said.
+  /// The report that is due now. It counts as printed.
   [[nodiscard]] Due due(Clock::time_point now) {
     if (now < next_) return Due::kNothing;
     next_ = now + kEvery;

@@ -1,4 +1,4 @@
-/// What the engines exchange once per tick. The plain form of idl/frames.idl, which describes every field; the headers
+/// The data that engines exchange once per tick. The plain form of idl/frames.idl, which describes every field; the headers
 /// that only the wire needs (publisher, run, directives) are added by core/federation/wire.
 #pragma once
 
@@ -75,7 +75,7 @@ struct BodyFrame {
   }
 };
 
-/// What the programs of one host set; entry i belongs to robot first_robot + i.
+/// Outputs of the programs of one host; entry i belongs to robot first_robot + i.
 struct ActuationFrame {
   Tick tick;
   std::uint32_t first_robot = 0;
@@ -89,7 +89,7 @@ struct ActuationFrame {
   std::vector<std::uint8_t> spin_up;  ///< per robot, full duty of both motors in the tick: core/base/spin_up.hpp
 };
 
-/// What the radio tells one host.
+/// Receptions and clocks that the radio passes to one host.
 struct RadioFrame {
   Tick tick;
   std::uint32_t first_robot = 0;
@@ -108,7 +108,7 @@ struct RadioFrame {
   std::vector<std::uint32_t> firmware_fault;  ///< 0, or cause << 24 | address in flash
 };
 
-/// What the station sends down to the overhead controller within one tick, by ascending offset.
+/// Packets from the station to the overhead controller within one tick, by ascending offset.
 struct OverheadFrame {
   Tick tick;
   std::vector<OverheadPacket> packets;
@@ -117,10 +117,10 @@ struct OverheadFrame {
 /// How a tracked robot is known; the numbers are those of the trackers' samples.
 enum class TrackedState : std::uint8_t { kSeen = 0, kPredicted = 1, kLost = 2, kInDoubt = 3 };
 
-/// An LED that no tracker has told.
+/// An LED whose colour no tracker has measured.
 inline constexpr std::uint8_t kUnknownLed = 255;
 
-/// What the station tells of tracked robots: those that a tracker has seen and that are not lost. Ascending ids.
+/// The station's poses of tracked robots: those that a tracker has seen and that are not lost. Ascending ids.
 struct TrackingFrame {
   Tick tick;
   std::vector<std::uint32_t> robot;

@@ -79,7 +79,7 @@ struct OverheadPacket {
   return octets;
 }
 
-/// What octets_of() made; nothing where the octets are none of a packet.
+/// Inverse of octets_of(). Nothing if the octets are no packet.
 [[nodiscard]] inline std::optional<OverheadPacket> packet_of(std::string_view octets) {
   constexpr std::size_t kShort = 1 + std::tuple_size_v<IrMessage>, kLong = 1 + OverheadPacket::kPayload;
   if (octets.size() != kShort && octets.size() != kLong) return std::nullopt;

@@ -1,4 +1,4 @@
-/// What the radio counts from the start of a run.
+/// Counters of the radio from the start of a run.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@ struct PairCount {
   std::uint32_t receiver, sender, count;
 };
 
-/// What one robot's radio did since the start. attempted = sent + backed_off + one that is on the air.
+/// Counters of one robot's radio since the start. attempted = sent + backed_off + one that is on the air.
 struct RadioCount {
   std::uint32_t attempted = 0;   ///< start pulses
   std::uint32_t sent = 0;        ///< whole packets

@@ -1,5 +1,5 @@
-/// The whole swarm at one tick, gathered once from the frames of all partitions and hosts: arrays by robot id. Whoever looks
-/// at more than one frame (radio, station, sensors, recorder) reads it instead of the frames.
+/// The whole swarm at one tick, gathered once from the frames of all partitions and hosts: arrays by robot id. Radio,
+/// station, sensors and recorder need more than one frame. They read this view instead of the frames.
 #pragma once
 
 #include <cstdint>

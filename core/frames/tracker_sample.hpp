@@ -18,7 +18,7 @@ struct HeardMessage {
   IrMessage message{};
 };
 
-/// Columns have one entry per robot that the tracker told of: tracked robots of the plan, each at most once. Lengths are the
+/// Columns have one entry per robot in the tracker's frame: tracked robots of the plan, each at most once. Lengths are the
 /// tracker's own; TrackerFrame of idl/public.idl says what the columns mean.
 struct TrackerSample {
   std::uint32_t source = 0;  ///< index in TrackingSettings::trackers, or in the order of their first samples

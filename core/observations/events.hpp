@@ -14,7 +14,7 @@ class EventRecord;
 class Observations;
 }  // namespace proto
 
-/// Which kinds of events a run records.
+/// The kinds of events that a run records.
 struct RecordedEvents {
   bool led = false, motion = false, state = false, sent = false, received = false, station = false;
   explicit RecordedEvents(const RunPlan& plan);

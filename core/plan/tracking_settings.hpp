@@ -20,7 +20,7 @@ struct TrackerSettings {
   double position_sd_mm = 1, heading_sd_rad = 0.1;
 };
 
-/// What a tracked robot says where the conditions hold.
+/// The message of a tracked robot while the conditions hold.
 struct SaysRuleSettings {
   struct Circle {
     double x_mm = 0, y_mm = 0, radius_mm = 0;
@@ -33,7 +33,7 @@ struct SaysRuleSettings {
   std::uint16_t tx_period = 0;             ///< between two messages, counts of 128 us
 };
 
-/// What real robots hear of simulated ones, by messages of the station.
+/// Messages by which the station passes messages of simulated robots to real ones.
 struct HearsSettings {
   enum class Data : std::uint8_t { kOctet, kSender, kDistance, kBearing };
   double range_mm = 0;

@@ -29,7 +29,7 @@ enum class Stream : std::uint16_t {
   kCorrelatedNoise = 31,   ///< correlated noise of effects, per tick
   kMeasurementNoise = 32,  ///< independent noise of effects on measurements, per tick
   kEpisodes = 90,          ///< begin and end of effects' episodes, drawn at the previous tick; the effect's draw
-  kStationCamera = 100,    ///< what the station's camera makes of robots; tick: its frame
+  kStationCamera = 100,    ///< errors of the station's camera; tick: its frame
   kStationPlugin = 101,    ///< draws of plugins; entity: the environment + 2^16 per 2^16 draws
   kConverter = 35,         ///< noise of a firmware robot's analogue converter; tick: its conversions / 2^16
 };

@@ -11,7 +11,7 @@ namespace kilotwin {
 /// A heading with a larger variance is none, rad^2.
 inline constexpr double kNoHeading_rad2 = 10;
 
-/// What one tracker says of one robot.
+/// One tracker's measurement of one robot.
 struct MeasuredPose {
   std::int64_t cycle = 0;
   double x_mm = 0, y_mm = 0, xx = 0, xy = 0, yy = 0;

@@ -1,4 +1,4 @@
-/// What the radio counts per robot, as variables that a run can record: experiment.proto, recording.variable. Recording them
+/// Counters of the radio per robot, as variables that a run can record: experiment.proto, recording.variable. Recording them
 /// changes no result.
 #pragma once
 

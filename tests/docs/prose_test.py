@@ -58,12 +58,16 @@ class Sentences(unittest.TestCase):
 
 
 class CommentsOfSources(unittest.TestCase):
-    SOURCE = ("/// One two three: four; five.\n///   a layout line\n// six seven\nint x = 0;  // not counted\n"
-              "#include <x>\n  // eight nine ten.\n")
+    SOURCE = ("/// One two three: four; five.\n///   a layout line\n// six seven\nint x = 0;  // one two three\n"
+              "           // four\nconst char* address = \"http: // not counted\";\n#include <x>\n  // eight nine ten.\n")
 
     def test_are_counted_line_by_line(self):
         found = [(line, len(words)) for line, words in prose.sentences(prose.comments(self.SOURCE), ".!?:;")]
-        self.assertEqual(found, [(1, 3), (1, 1), (1, 1), (3, 2), (6, 3)])
+        self.assertEqual(found, [(1, 3), (1, 1), (1, 1), (3, 2), (4, 4), (8, 3)])
+
+    def test_of_scripts_begin_with_a_hash(self):
+        text = "# One two.\nx = 1  # three four five\ny = '# not counted'\n"
+        self.assertEqual([len(words) for _, words in prose.sentences(prose.comments(text, "#"))], [2, 3])
 
     def test_have_short_sentences(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -72,6 +76,23 @@ class CommentsOfSources(unittest.TestCase):
             outcome = subprocess.run([SCRIPT, source], capture_output=True, text=True, check=False)
         self.assertEqual(outcome.returncode, 1)
         self.assertIn("source.hpp:1: a sentence of 31 words", outcome.stdout)
+
+
+class HeadlessSentences(unittest.TestCase):
+    def test_begin_with_a_relative_clause_and_are_no_questions(self):
+        for text, is_headless in (("What is found is tried.", True), ("Whoever comes later waits.", True),
+                                  ("What is found?", False), ("The robot that comes later waits.", False)):
+            self.assertEqual(run(f"{text}\n").returncode, int(is_headless), text)
+
+    def test_are_found_in_comments_of_scripts_and_behind_code(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for name, text in (("a.cpp", "int x;  // What it holds.\n"), ("b.sh", "# Who may call it.\n"),
+                               ("c", "#!/bin/sh\n# Which one acts.\n")):
+                source = pathlib.Path(folder) / name
+                source.write_text(text, encoding="utf-8")
+                outcome = subprocess.run([SCRIPT, source], capture_output=True, text=True, check=False)
+                self.assertEqual(outcome.returncode, 1, name)
+                self.assertIn("begin with a noun", outcome.stdout)
 
 
 class LeftOut(unittest.TestCase):

@@ -45,7 +45,7 @@ constexpr std::uint32_t kRobots = 7;
 constexpr std::uint32_t kIndices = 121;
 constexpr char kClient[] = "fast dds";
 
-/// What a factory of Fast DDS gives, or an exception that names it.
+/// The entity that a factory of Fast DDS made. Throws an exception that names it if there is none.
 template <class T> T* made(T* entity, const std::string& what) {
   if (entity == nullptr) throw std::runtime_error("Fast DDS cannot make " + what);
   return entity;

@@ -52,7 +52,7 @@ class Layers(unittest.TestCase):
     def test_a_tree_that_keeps_to_the_table_has_no_findings(self):
         self.assertEqual(self.findings(), [])
 
-    def test_a_forbidden_include_is_reported_with_file_line_and_what_the_layer_may_include(self):
+    def test_a_forbidden_include_is_reported_with_file_line_and_the_allowed_folders(self):
         self.assertEqual(
             self.findings(core__plan__plan_dot_hpp='#include "core/base/ids.hpp"\n\n#include "services/radio/engine.hpp"\n')[0],
             "core/plan/plan.hpp:3: core/plan may not include services/radio/engine.hpp of services/radio; "

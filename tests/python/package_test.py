@@ -215,7 +215,7 @@ class Package(unittest.TestCase):
             np.testing.assert_array_equal(arena.variable("gain"), [10, 11, 12, 7, 255])
             with self.assertRaisesRegex(KeyError, "there are: gain"):
                 arena.variable("gains")
-            # Whoever hears the station shows it, from the next ticks on.
+            # Robots that hear the station show it, from the next ticks on.
             arena.send(9, [0b11])
             arena.step(seconds=0.2)
             np.testing.assert_array_equal(arena.variable("heard"), 9)
@@ -236,7 +236,7 @@ class Package(unittest.TestCase):
             with self.assertRaisesRegex(kilotwin.KilotwinError, "robot 2 has no variable"):
                 arena.set_variable("gain", 1)
 
-    def test_an_arena_and_a_run_that_are_told_the_same_have_the_same_hash(self):
+    def test_an_arena_and_a_run_with_the_same_requests_have_the_same_hash(self):
         domain = free_domain()
         options = ["--robots", "12", "--duration", "600", "--seed", "3"]
         words = ["run", str(EXPERIMENT), *options, "--pace", "1", "--partitions", "2x1", "--quiet", "--domain", str(domain)]
@@ -307,7 +307,7 @@ class Package(unittest.TestCase):
         with self.assertRaisesRegex(kilotwin.KilotwinError, "is battery_V"):
             kilotwin.run(self.out / "wrong.txtpb", out=self.out / "wrong")
 
-    def test_trajectories_say_who_has_failed(self):
+    def test_trajectories_name_robots_that_failed(self):
         (self.out / "obeys.c").write_text(OBEYS.replace("seen_at_setup = gain", "if (kilo_uid == 2) *(volatile int*)8 = 1"))
         (self.out / "e.txtpb").write_text(OBEYING)
         table = kilotwin.run(self.out / "e.txtpb", out=self.out / "run").trajectories()
@@ -361,12 +361,12 @@ class Package(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    # What is left open is told when it is collected, where no test can catch it.
+    # An arena that is left open is reported when it is collected, where no test can catch it.
     left_open = []
     sys.unraisablehook = left_open.append
     warnings.simplefilter("error", ResourceWarning)
     done = unittest.main(argv=sys.argv[:1], exit=False, warnings="")
     gc.collect()
-    for told in left_open:
-        print(f"left open: {told.exc_value} in {told.object!r}", file=sys.stderr)
+    for report in left_open:
+        print(f"left open: {report.exc_value} in {report.object!r}", file=sys.stderr)
     sys.exit(not done.result.wasSuccessful() or bool(left_open))

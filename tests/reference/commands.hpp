@@ -6,7 +6,7 @@
 
 namespace kilotwin::reference {
 
-/// What `kilotwin --help` and `kilotwin COMMAND --help` print, a section per command. Throws std::runtime_error where the
+/// The output of `kilotwin --help` and `kilotwin COMMAND --help`, a section per command. Throws std::runtime_error where the
 /// program does not run.
 [[nodiscard]] std::string commands_help(const std::filesystem::path& program);
 

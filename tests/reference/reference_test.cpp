@@ -21,7 +21,7 @@ const std::filesystem::path kSources = KILOTWIN_SOURCE_DIR;
 
 class Page : public testing::TestWithParam<const char*> {};
 
-TEST_P(Page, IsWhatItsSourcesSay) {
+TEST_P(Page, AgreesWithItsSources) {
   const std::string page = read_text(kSources / "docs" / "reference" / GetParam());
   EXPECT_EQ(page, regenerated(page, regions(kSources, KILOTWIN_PROGRAM)))
       << "docs/reference/" << GetParam() << " is out of date: run scripts/reference and commit the page";

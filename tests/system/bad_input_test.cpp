@@ -71,7 +71,7 @@ TEST_F(BadInput, CheckCompilesEveryProgram) {
   expect_in("broken.c:3:11: error: ", refusal({"sweep", two_groups, "--seeds", "1..2"}));
 }
 
-TEST_F(BadInput, WithoutTrajectoriesNamesWhatIsThereAndWhatIsExpected) {
+TEST_F(BadInput, WithoutTrajectoriesNamesTheFilesFoundAndExpected) {
   fs::create_directory(scratch / "data");
   const auto of = [&](const std::string& path) { return refusal({"identify", "--train", scratch / path}); };
   expect_in("is an empty directory; expected trajectories.csv", of("data"));

@@ -86,7 +86,7 @@ TEST_F(Commands, ExportWritesGzipAndToStandardOutput) {
   EXPECT_NE(two.err.find("standard output"), std::string::npos) << two.err;
 }
 
-TEST_F(Commands, ARunSaysByWhatWhenAndWhereItWasMade) {
+TEST_F(Commands, ARunNamesItsBuildItsTimeAndItsPlace) {
   run(small({"--seed", "4"}), scratch, "run");
   const auto summary = nlohmann::json::parse(read(scratch / "run/summary.json"));
   for (const char* field : {"version", "build", "host", "date"})

@@ -65,7 +65,7 @@ TEST(Debug, StopsWhereARobotFails) {
   EXPECT_NE(outcome.out.find("= 60\n"), std::string::npos) << outcome.out;
 }
 
-TEST(Debug, SaysWhichRobotsThereAre) {
+TEST(Debug, ListsTheRobots) {
   const Scratch scratch;
   const Outcome outcome = debugged(scratch, {"--robot", "10"});
   EXPECT_EQ(outcome.status, 2);

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# demo_configures.sh SOURCES: configures as scripts/demo does, with the packages hidden that scripts/packages.txt has in other sets than
-# `run`, and checks that the programs of the demo are among the targets and that the others are not.
+# demo_configures.sh SOURCES: configures as scripts/demo does. Hides the packages that scripts/packages.txt has in other sets than
+# `run`. Checks that the programs of the demo are among the targets, and that the others are not.
 set -euo pipefail
 sources=$1
 build=$(mktemp -d)

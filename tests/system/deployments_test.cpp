@@ -478,7 +478,7 @@ void Deployments::play_d() {
   world_run->wait(60);
   const World world(of_world.moments());
   const std::vector<Moment> seen = of_run.moments();
-  // Who is who is found once, by place, and stays so.
+  // Tracks are assigned to robots once, by place, and keep their robots.
   const auto begin = std::find_if(seen.begin(), seen.end(), [](const Moment& m) { return m.time_s >= kFrom_s; });
   ASSERT_NE(begin, seen.end());
   const auto whose = nearest(world, *begin, kSimulated);

@@ -1,5 +1,5 @@
 // The residual monitor in a hybrid run: a second, independent experiment plays the real robots, whose recorded poses a player
-// publishes as a tracker would. What the monitor says while the run lasts, it says again of the recording.
+// publishes as a tracker would. The monitor gives the same alarms while the run lasts and from the recording.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -52,7 +52,7 @@ struct Pose {
   double x_mm, y_mm, heading_rad;
 };
 
-/// What a tracker would see of the other experiment: its table of trajectories, frame by frame.
+/// The poses that a tracker would see of the other experiment: its table of trajectories, frame by frame.
 std::vector<std::vector<Pose>> frames_of(const std::filesystem::path& table) {
   CsvReader rows(table);
   const std::size_t robot = rows.column("robot"), time = rows.column("time_s"), x = rows.column("x_mm"),

@@ -1,4 +1,4 @@
-// What runs record besides states: variables of programs, events, observables, failures.
+// Records of runs besides states: variables of programs, events, observables, failures.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -311,7 +311,7 @@ TEST_F(Observations, AnInterruptedSweepGoesOn) {
   EXPECT_EQ(kilotwin(again, scratch_).status, 2) << "another sweep";
 }
 
-TEST_F(Observations, FailuresSayWhoWhenAndWhere) {
+TEST_F(Observations, FailuresNameRobotTimeAndPlace) {
   for (const char* mode : {"local", "federated"}) {
     const Outcome outcome = kilotwin({"run", scratch_ / "plain.txtpb", "--mode", mode, "--define", "FAULT",
                                       "--strict", "--quiet", "--out", scratch_ / mode},

@@ -248,7 +248,7 @@ TEST_F(Ohc, APhysicalControllerDoesAsTheStationDoesAndStopsAtEveryEnding) {
   EXPECT_EQ(controller.counters().bad_checksums, 0u);
 }
 
-/// DDS gives a process up after its lease of 30 s only; robots would do for so long what they were told last. That STOP is on the
+/// DDS gives a process up after its lease of 30 s only; robots would follow their last command for so long. That STOP is on the
 /// line within 2 s is held by the test StopRule, on a clock of its own.
 TEST_F(Ohc, APhysicalControllerStopsWhenTheStationIsKilled) {
   Controller controller;

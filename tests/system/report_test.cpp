@@ -44,7 +44,7 @@ class RunReport : public testing::Test {
   Scratch scratch;
 };
 
-TEST_F(RunReport, SaysWhatARunDidAndWhichRobotsFailed) {
+TEST_F(RunReport, DescribesTheRunAndNamesFailedRobots) {
   const Outcome outcome = run({"--mode", "local", "--seed", "7"});
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_NE(outcome.out.find("report.html"), std::string::npos);

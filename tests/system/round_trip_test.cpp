@@ -1,4 +1,4 @@
-// What a run exports is what `identify` reads, and what identify writes is what further runs take.
+// `identify` reads the exports of runs, and further runs take the model that `identify` writes.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -148,7 +148,7 @@ python3 - "$scratch/sweep/runs.csv" "$scratch/plain/runs.csv" "$runs" << 'END'
 import csv
 import sys
 
-# What depends on the machine, or on where the results lie, may differ.
+# Fields that depend on the machine, or on the place of the results, may differ.
 DIFFERS = {"directory", "wall_s", "start_s", "cpu_s", "peak_memory_mib", "run", "speed"}
 tables = [[{k: v for k, v in row.items() if k not in DIFFERS} for row in csv.DictReader(open(name))] for name in sys.argv[1:3]]
 if len(tables[0]) != int(sys.argv[3]) or tables[0] != tables[1]:

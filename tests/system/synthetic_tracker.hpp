@@ -22,7 +22,7 @@ struct CirclingRobot {
   std::uint8_t led = 0;
 };
 
-/// What a tracker is like. Its frame lies at (x_mm, y_mm) of the arena, turned by turn_rad.
+/// Properties of a tracker. Its frame lies at (x_mm, y_mm) of the arena, turned by turn_rad.
 struct TrackerKind {
   std::string source = "ceiling";
   double clock_ahead_s = 37;

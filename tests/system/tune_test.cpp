@@ -126,7 +126,7 @@ TEST(TuneCommand, TheWorstOfSeveralModelsDecides) {
   EXPECT_LT(of_worst, 0.5 * of_mean);
 }
 
-TEST(TuneCommand, ErrorsSayWhatIsWrong) {
+TEST(TuneCommand, ErrorsNameTheMistake) {
   Scratch scratch;
   const std::string experiment = source("experiments/disperse.txtpb");
   const auto error = [&](const Words& words) {

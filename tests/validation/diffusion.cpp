@@ -64,7 +64,7 @@ void validate_diffusion(Runs& runs, Verdicts& verdicts, Effort effort) {
                            effort.quick ? 3 : 0);
   }
   for (const double time_s : {10.0, 60.0, 120.0, 180.0}) {
-    // What contact takes away lies outside of what 10 % would explain.
+    // Contact lowers the displacement by more than 10 % would explain.
     const Figure with = msd_at(crowd, time_s), without = msd_at(free, time_s);
     verdicts.at_least(fmt::format("without contact over with contact, {:.0f} s", time_s), "",
                       {without.value / with.value}, 1 + kAgreement);

@@ -11,7 +11,7 @@
 
 namespace kilotwin::validation {
 
-/// What was recorded of one run.
+/// The recording of one run.
 struct Recorded {
   std::vector<double> time_s;
   std::vector<std::vector<double>> x_mm, y_mm, heading_rad;     ///< per recorded state: per robot

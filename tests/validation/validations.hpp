@@ -1,4 +1,4 @@
-/// What is validated, one function each: it runs what it needs and adds its rows.
+/// The validations, one function each: it runs what it needs and adds its rows.
 #pragma once
 
 #include "tests/validation/runs.hpp"

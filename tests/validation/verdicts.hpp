@@ -27,7 +27,7 @@ class Verdicts {
                      double part, double errors);
   void at_most(const std::string& what, const std::string& unit, Figure measured, double bound);
   void at_least(const std::string& what, const std::string& unit, Figure measured, double bound);
-  /// What could not be looked at, and why. No miss.
+  /// A check that could not be made, and why. No miss.
   void absent(const std::string& what, const std::string& why);
 
   /// All sections and rows so far as Markdown tables.

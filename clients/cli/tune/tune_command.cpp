@@ -85,7 +85,7 @@ int tune_experiment(TuneArguments arguments) {
   settings.parameters = result.parameters.size();
   settings.seeds = arguments.seeds;
   settings.seed = arguments.seed;
-  // What is measured last is measured for the present values too.
+  // The last measurement covers the present values too.
   const std::size_t last = tune::last_seeds(settings).count;
   settings.budget = arguments.budget / models > last ? arguments.budget / models - last : 0;
   if (settings.budget < tune::least_budget(settings))

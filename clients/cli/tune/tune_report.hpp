@@ -1,4 +1,4 @@
-/// What `kilotwin tune` leaves: tune.json, points.csv, search.svg, report.html.
+/// Results of `kilotwin tune`: tune.json, points.csv, search.svg, report.html.
 #pragma once
 
 #include <filesystem>

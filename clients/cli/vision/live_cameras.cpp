@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <chrono>
-#include <future>
 #include <memory>
-#include <thread>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "clients/cameras/ark_rig.hpp"
@@ -20,6 +20,7 @@
 #include "core/base/say.hpp"
 #include "core/os/files.hpp"
 #include "core/os/interrupt.hpp"
+#include "core/os/worker_pool.hpp"
 
 namespace kilotwin::cli {
 namespace {
@@ -57,7 +58,7 @@ class FrameRate {
   Clock::time_point counted_;
 };
 
-/// What is drawn for one run: a renderer per camera that somebody looks through.
+/// The pictures of one run: a renderer per camera that somebody looks through.
 class Studio {
  public:
   Studio(const LiveCameras& live, const World& world) {
@@ -65,11 +66,11 @@ class Studio {
       big_ = std::make_unique<Renderer>(world, big_camera(live.camera, world), live.camera.look);
     if (live.directory.empty()) return;
     // Backgrounds take long: they are painted at the same time.
-    std::vector<std::future<Renderer>> painted;
-    for (const cameras::CameraModel& camera : cameras::ark_cameras(model_of(live.camera)))
-      painted.push_back(std::async(std::launch::async,
-                                   [&world, &live, camera] { return Renderer(world, camera, live.camera.look); }));
-    for (std::future<Renderer>& one : painted) ark_.push_back(one.get());
+    const auto models = cameras::ark_cameras(model_of(live.camera));
+    std::vector<std::optional<Renderer>> painted(models.size());
+    os::in_parallel(models.size(), static_cast<std::uint32_t>(models.size()),
+                    [&](std::size_t i) { painted[i].emplace(world, models[i], live.camera.look); });
+    for (std::optional<Renderer>& one : painted) ark_.push_back(std::move(*one));
     if (std::max(world.arena.half_width_mm(), world.arena.half_height_mm()) > cameras::kArkHalf_mm)
       warn(
           fmt::format("kilotwin: --dir: the arena ({}) is larger than the 2000 mm x 2000 mm that ARK sees; robots "
@@ -175,15 +176,10 @@ class Live {
     std::vector<Renderer>& renderers = studio_->ark();
     std::vector<std::string> pictures(renderers.size());
     ark_pictures_.resize(renderers.size());
-    {
-      std::vector<std::jthread> threads;
-      for (std::size_t i = 0; i < renderers.size(); ++i) {
-        threads.emplace_back([&, i] {
-          renderers[i].render(scene_, stamp_.frame, ark_pictures_[i]);
-          pictures[i] = cameras::encoded(ark_pictures_[i], PictureFormat::kJpeg, stamp_, live_.quality);
-        });
-      }
-    }
+    os::in_parallel(renderers.size(), static_cast<std::uint32_t>(renderers.size()), [&](std::size_t i) {
+      renderers[i].render(scene_, stamp_.frame, ark_pictures_[i]);
+      pictures[i] = cameras::encoded(ark_pictures_[i], PictureFormat::kJpeg, stamp_, live_.quality);
+    });
     directory_->look();
     directory_->put(std::move(pictures));
   }

@@ -192,7 +192,7 @@ void keep_pace(track::CapturedFrame& frame, Clock::time_point start) {
   frame.capture_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(due.time_since_epoch()).count();
 }
 
-/// What is looked at, and where its pixels lie on the floor.
+/// The source of pictures, and the places of its pixels on the floor.
 struct View {
   std::unique_ptr<track::Source> source;
   std::optional<track::FloorMap> floor;

@@ -11,7 +11,7 @@
 
 namespace kilotwin::cli {
 
-/// What the ids of samples are: tracks, or the robots' own numbers. Robots whose number is not known are then left out.
+/// Meaning of the ids of samples: tracks, or the robots' own numbers. Robots whose number is not known are then left out.
 enum class SampleIds { kTracks, kNumbers };
 
 class TrackerStream {

@@ -19,7 +19,7 @@ class LineSource {
   [[nodiscard]] std::vector<std::string> read(double seconds);
   /// Whether everything has been read: a file's end, until it grows.
   [[nodiscard]] bool at_end() const { return at_end_; }
-  /// What stands behind the last line's end.
+  /// The text after the last line's end.
   [[nodiscard]] const std::string& rest() const { return line_; }
 
  private:

@@ -11,7 +11,7 @@
 
 namespace kilotwin::doors {
 
-/// What a log holds, found by reading all of it.
+/// Extent of a log, found by reading all of it.
 struct LogExtent {
   std::uint64_t rows = 0;
   double first_s = 0, last_s = 0;

@@ -26,7 +26,7 @@ struct ReadTopic {
 };
 [[nodiscard]] std::vector<ReadTopic> topics_of(const Door& door);
 
-/// What receive threads hand to the door's own thread.
+/// Messages that receive threads hand to the door's own thread.
 class Inbox {
  public:
   struct Item {

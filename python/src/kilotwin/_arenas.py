@@ -82,7 +82,7 @@ class Arenas:
             self._arrays[name] = made
         self._seeds: list[int] = about["seeds"]
 
-    # What the arenas show.
+    # State of the arenas.
 
     def _view(self, array: NDArray[Any]) -> NDArray[Any]:
         return array
@@ -183,7 +183,7 @@ class Arenas:
         """Seed of each arena."""
         return tuple(self._seeds)
 
-    # What the caller does.
+    # Requests of the caller.
 
     def step(self, ticks: int | None = None, *, seconds: float | None = None) -> None:
         """Steps all arenas that have not ended: by a number of ticks, or until `seconds` more have passed; else by one tick."""

@@ -124,7 +124,7 @@ TEST(Placement, WithoutARotationTheHeadingIsNotKnown) {
   EXPECT_TRUE(std::isinf(robot.heading_variance_rad2)) << "its x axis is vertical";
 }
 
-TEST(Placement, RefusesWhatIsNoPose) {
+TEST(Placement, RefusesAllButPoses) {
   const Placement placement(settings("ros2 {}"));
   TrackedRobot robot;
   const double inf = std::numeric_limits<double>::infinity();

@@ -58,7 +58,7 @@ bool notes(const Imported& imported, const std::string& words) {
                      [&](const std::string& note) { return note.find(words) != std::string::npos; });
 }
 
-TEST(ArgosImport, TakesOverWhatHasACounterpart) {
+TEST(ArgosImport, TakesOverElementsWithACounterpart) {
   const Imported imported = from_argos(kGather, "gather.argos");
   const proto::Experiment& e = imported.experiment;
   EXPECT_EQ(e.duration_s(), 60);
@@ -95,7 +95,7 @@ TEST(ArgosImport, PlacesRobotsByTheirDiscs) {
   EXPECT_EQ(imported.poses[0].text, "x_mm,y_mm,heading_deg\n-400.000,409.200,90\n409.200,-400.000,0\n");
 }
 
-TEST(ArgosImport, SaysWhatWasNotTakenOverWithItsLine) {
+TEST(ArgosImport, NamesTheLinesThatWereNotTakenOver) {
   const Imported imported = from_argos(kGather, "gather.argos");
   EXPECT_TRUE(notes(imported, "2: <system>: threads=\"4\": give --threads"));
   EXPECT_TRUE(notes(imported, "27: <kilobot>: colour=\"red\" has no counterpart"));
@@ -217,7 +217,7 @@ parameters:
     run_duration_min: 1000
 )";
 
-TEST(PogosimImport, TakesOverWhatHasACounterpart) {
+TEST(PogosimImport, TakesOverElementsWithACounterpart) {
   const Imported imported = from_pogosim(kPogosim, "c.yaml");
   const proto::Experiment& e = imported.experiment;
   EXPECT_EQ(e.duration_s(), 300);
@@ -272,7 +272,7 @@ objects: { a: { type: pogobot, nb: 2 }, b: { type: pogobot, nb: 1 } }
   EXPECT_TRUE(notes(from_pogosim(text, "c.yaml"), "is no CSV file that can be read"));
 }
 
-TEST(PogosimImport, SaysWhatWasNotTakenOverWithItsLine) {
+TEST(PogosimImport, NamesTheLinesThatWereNotTakenOver) {
   const Imported imported = from_pogosim(kPogosim, "c.yaml");
   for (const char* note :
        {"2: boundary_condition: periodic", "8: time_step: a tick is", "18: walls: pogowall has no counterpart",

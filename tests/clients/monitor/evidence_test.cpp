@@ -105,7 +105,7 @@ TEST(CommandTable, ErrorsNameTheirPlace) {
   }
 }
 
-TEST(Alarm, SaysWhatLeftTheModelByHowMuchAndSinceWhen) {
+TEST(Alarm, NamesTheSuspectItsSizeAndItsOnset) {
   Alarm alarm;
   alarm.time_s = 71.44;
   alarm.onset_s = 70.3;

@@ -139,7 +139,7 @@ TEST(Monitor, AMotorThatFailsIsNamed) {
 }
 
 /// Robots without shadows: the station's packets tell what they were commanded.
-TEST(Monitor, AMotorThatFailsIsNamedByWhatTheStationSent) {
+TEST(Monitor, AFailingMotorIsNamedFromTheStationsMessages) {
   MonitorSettings settings;
   settings.station_commands = station_commands_of("3=stop,4=straight,1=left,2=right");
   VirtualArena arena(with_a_failing_motor(), settings);

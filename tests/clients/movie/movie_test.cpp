@@ -118,7 +118,7 @@ TEST(Movie, OfALongRunIsFaster) {
   EXPECT_NEAR(made.duration_s, 399 * 10 * kTick_s / 5, 1);
 }
 
-TEST(Movie, SaysWhatKeepsItFromBeingWritten) {
+TEST(Movie, NamesTheErrorThatKeepsItFromBeingWritten) {
   const Scratch scratch;
   const std::filesystem::path recording = walk(scratch, 3);
   try {
@@ -185,7 +185,7 @@ TEST(MovieFormat, FollowsTheName) {
   EXPECT_EQ(format_of("mp4"), std::nullopt);
 }
 
-TEST(Rasteriser, DrawsWhatTheTextSays) {
+TEST(Rasteriser, DrawsTheElementsOfTheText) {
   const std::vector<std::uint8_t> picture = rasterised(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"4\" height=\"2\"><rect width=\"2\" height=\"2\" "
       "fill=\"#010203\"/></svg>",

@@ -42,7 +42,7 @@ std::vector<std::size_t> frame_ends(const std::string& bytes) {
   return ends;
 }
 
-TEST(Recording, ReadsBackWhatWasWritten) {
+TEST(Recording, ReadsBackItsRecords) {
   const Scratch scratch;
   const auto header = synthetic_header(7);
   write_synthetic(scratch / "r.ktrec", header, 100);
@@ -424,16 +424,16 @@ TEST(Writer, ReportsAFullDiskAndContinuesWhenThereIsSpace) {
     const rlimit little{10'000, RLIM_INFINITY}, much{RLIM_INFINITY, RLIM_INFINITY};
     ::setrlimit(RLIMIT_FSIZE, &little);
     Writer writer(file, synthetic_header(100));
-    std::string told;
+    std::string line;
     for (std::int64_t t = 0; t < 10; ++t) {
       writer.state(SyntheticState(100, Tick{t}).view(Tick{t}));
       try {
         writer.flush();
       } catch (const RunError& error) {
-        told = error.what();
+        line = error.what();
       }
     }
-    if (told != file.string() + ": cannot be written: File too large") ::_exit(3);
+    if (line != file.string() + ": cannot be written: File too large") ::_exit(3);
     ::setrlimit(RLIMIT_FSIZE, &much);
     writer.end(Tick{9}, 1);
   });

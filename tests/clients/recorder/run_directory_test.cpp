@@ -52,7 +52,7 @@ TEST(RunDirectory, RefusesAnExistingDirectoryThatIsNotEmpty) {
   EXPECT_FALSE(fs::exists(scratch / "run-2"));
 }
 
-TEST(RunDirectory, ReplacesOnlyWhatKilotwinHasWritten) {
+TEST(RunDirectory, ReplacesOnlyDirectoriesOfKilotwin) {
   const Scratch scratch;
   using Existing = RunDirectory::Existing;
   put_content(RunDirectory::create(scratch / "run").path() / "summary.json", "old");

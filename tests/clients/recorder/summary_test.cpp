@@ -102,7 +102,7 @@ Summary rich_example() {
   return s;
 }
 
-TEST(Summary, ReadsBackWhatWasWritten) {
+TEST(Summary, ReadsBackItsFields) {
   const Scratch scratch;
   write_summary(rich_example(), scratch / "a.json");
   write_summary(read_summary(scratch / "a.json"), scratch / "b.json");

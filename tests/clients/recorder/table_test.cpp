@@ -146,7 +146,7 @@ assert list(t["word"]) == ["" if n % 5 == 0 else f"w{n % 300}" for n in i]
 )");
 }
 
-TEST_F(TableTest, AnArchiveOfManyColumnsStillSaysWhatTheyAre) {
+TEST_F(TableTest, AnArchiveOfManyColumnsStillNamesThem) {
   std::vector<Column> columns;
   for (int i = 0; i < 2000; ++i)
     columns.push_back({"variable_with_a_long_name_" + std::to_string(i), "mm", CellType::kInteger});

@@ -152,7 +152,7 @@ TEST(Tune, TheSameSeedGivesTheSamePoints) {
   EXPECT_EQ(first.value.mean, second.value.mean);
 }
 
-TEST(Tune, EstimatesLeaveOutWhatFailed) {
+TEST(Tune, EstimatesLeaveOutFailedRuns) {
   const Estimate e = estimate({1, std::nan(""), 3});
   EXPECT_EQ(e.count, 2u);
   EXPECT_DOUBLE_EQ(e.mean, 2);

@@ -144,8 +144,8 @@ TEST(CsvReader, FilesThatCannotBeReadAreNamed) {
   const auto error = [&](const std::filesystem::path& file) -> std::string {
     try {
       const CsvReader reader(file);
-    } catch (const UserError& told) {
-      return told.what();
+    } catch (const UserError& refusal) {
+      return refusal.what();
     }
     return {};
   };

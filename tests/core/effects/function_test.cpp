@@ -123,7 +123,7 @@ TEST(EffectFunction, MultiplyAgreesWithTheScalarForm) {
   }
 }
 
-TEST(EffectFunction, ValuesAreFiniteWhateverTheCovariate) {
+TEST(EffectFunction, ValuesAreFiniteForAnyCovariate) {
   std::mt19937 engine{5};
   const auto any = [&] {
     return std::ldexp(static_cast<double>(engine()) - 2147483648.0, static_cast<int>(engine() % 60) - 50);

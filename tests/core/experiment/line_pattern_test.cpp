@@ -1,4 +1,4 @@
-// What listeners print: patterns, lines, and text of any kind.
+// Lines that listeners print: patterns, lines, and text of any kind.
 #include "core/experiment/line_pattern.hpp"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@ namespace {
 
 using Octets = std::vector<std::uint8_t>;
 
-TEST(LinePattern, TakesWhatTheFieldsStandFor) {
+TEST(LinePattern, TakesTheValuesOfItsFields) {
   const LinePattern pattern("rx {type}: {data} at {distance} from {sender}");
   const auto line = pattern.match("rx 3: 1 2, 0xff,4 at 61.5 from 17\r");
   ASSERT_TRUE(line);

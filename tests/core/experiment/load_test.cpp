@@ -143,7 +143,7 @@ TEST_F(Load, PropagationWithoutABlockIsThatOfTheMeasuredRobots) {
       same(fields.GetRepeatedDouble(radio.propagation(), field, i),
            fields.GetRepeatedDouble(expected.propagation(), field, i));
   }
-  // What an experiment states remains.
+  // Values that an experiment states remain.
   for (const char* text :
        {"radio { model: PROPAGATION propagation { power_sd_db: 2 } }", "radio { model: DISC }"}) {
     proto::Experiment own = load(text).experiment;

@@ -131,7 +131,7 @@ TEST(Ingress, StampsForTheTickAtWhichTheRunPauses) {
 }
 
 /// A model of the federation: federates in the order of the path that a mention takes, each with its own schedule; frames
-/// and directives travel with random delays. Whatever the delays, all must do the same at every tick.
+/// and directives travel with random delays. For any delays, all must do the same at every tick.
 class Federation {
  public:
   explicit Federation(unsigned seed, std::int64_t last) : random_(seed), last_(last) {
@@ -259,7 +259,7 @@ TEST(Ingress, ContinuesAfterEarlierDirectives) {
   }
 }
 
-TEST(RunSchedule, AllFederatesActAlikeWhateverTheDelays) {
+TEST(RunSchedule, AllFederatesActAlikeForAnyDelays) {
   std::size_t inputs_seen = 0;
   for (unsigned seed = 1; seed <= 200; ++seed) {
     Federation federation(seed, 400);

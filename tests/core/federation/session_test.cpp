@@ -441,7 +441,7 @@ TEST_F(Sessions, DecodeFramesWithoutTheirMutex) {
   EXPECT_EQ(held, 0);
 }
 
-TEST_F(Sessions, PrintForWhomTheyWait) {
+TEST_F(Sessions, PrintTheFederatesThatTheyWaitFor) {
   std::atomic<bool> said{false};
   of(plan_.station()).on_idle = [&](Session& session) {
     if (session.waiting_for().find("behaviours 1/1 to arrive") != std::string::npos) said = true;

@@ -11,14 +11,14 @@ using namespace std::chrono_literals;
 
 const WaitReport::Clock::time_point kBegan{1h};
 
-/// What is said at each full second of a wait, from 0: '.' nothing, 'w' whom, 'c' whom and the likely cause.
+/// The reports at each full second of a wait, from 0: '.' none, 'w' the federates, 'c' the federates and the likely cause.
 std::string said(WaitReport& report, int from_s, int to_s) {
   std::string text;
   for (int s = from_s; s < to_s; ++s) text += ".wc"[static_cast<int>(report.due(kBegan + s * 1s))];
   return text;
 }
 
-TEST(WaitReport, NamesWhomAfterASecondAndThenEveryFive) {
+TEST(WaitReport, NamesFederatesAfterASecondAndThenEveryFive) {
   WaitReport report(kBegan);
   EXPECT_EQ(said(report, 0, 13), ".w....w....w.");
 }

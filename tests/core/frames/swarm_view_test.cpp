@@ -9,7 +9,7 @@
 namespace kilotwin {
 namespace {
 
-/// What a gathering is refused for; empty: nothing.
+/// The error of a gathering. Empty: none.
 std::string refusal(SwarmView& view, const std::vector<BodyFrame>& bodies, Tick tick = Tick{3}) {
   std::vector<const BodyFrame*> frames;
   for (const BodyFrame& frame : bodies) frames.push_back(&frame);
@@ -77,7 +77,7 @@ TEST(SwarmView, RefusesARobotThatTwoPartitionsClaim) {
   EXPECT_EQ(refusal(view, bodies), "two partitions claim robot 1 at tick 3");
 }
 
-TEST(SwarmView, PutsWhatProgramsSetInItsPlace) {
+TEST(SwarmView, PutsOutputsOfProgramsInTheirPlaces) {
   SwarmView view(4, 0, 0);
   ActuationFrame second = actuation(2, {7, 8}), first = actuation(0, {1, 2});
   second.offer_robot = {3};

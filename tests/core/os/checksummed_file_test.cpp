@@ -56,7 +56,7 @@ std::string random_bytes(std::size_t count, std::uint64_t seed) {
   return bytes;
 }
 
-TEST_F(ChecksummedFile, ReturnsWhatWasWritten) {
+TEST_F(ChecksummedFile, ReturnsTheWrittenContent) {
   for (const std::size_t length : {0u, 1u, 8191u, 8192u, 8193u, 16384u, 100'000u}) {
     const std::string content = random_bytes(length, length);
     write_checksummed(file(), kKind, content);

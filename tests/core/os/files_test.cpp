@@ -34,7 +34,7 @@ template <class Error, class Action> std::string error_of(Action action) {
   return "";
 }
 
-TEST_F(Files, ReturnWhatWasWritten) {
+TEST_F(Files, ReturnTheWrittenContent) {
   const std::string content("a\0b\n\xff", 5);
   write_file(folder_ / "a", content);
   EXPECT_EQ(read_file(folder_ / "a"), content);

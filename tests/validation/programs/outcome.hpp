@@ -1,4 +1,4 @@
-/// What robots did in runs of one program, and how far native robots and firmware robots agree.
+/// Behaviour of robots in runs of one program, and agreement of native robots and firmware robots.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ struct Change {
   std::uint32_t value = 0;
 };
 
-/// What the robots of one kind did: entry i belongs to robot i % robots of run i / robots. Runs differ by their seeds.
+/// Behaviour of the robots of one kind: entry i belongs to robot i % robots of run i / robots. Runs differ by their seeds.
 struct Outcome {
   std::string refusal;  ///< not empty: why the program did not run
   std::string warning;  ///< the first line that a run printed about the program

@@ -24,7 +24,7 @@ Outcome outcome_of(const std::vector<double>& path_mm_of_runs) {
   return outcome;
 }
 
-TEST(PermutationTest, SeparatesWhatDiffersAndNothingElse) {
+TEST(PermutationTest, SeparatesOnlySamplesThatDiffer) {
   const std::vector<double> low{1, 2, 3, 4, 5, 6, 7, 8, 9, 10};
   std::vector<double> high = low, shifted = low;
   for (double& value : high) value += 20;

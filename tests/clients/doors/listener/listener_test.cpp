@@ -1,4 +1,4 @@
-// What a listener prints becomes messages of real robots; its line comes from files and terminals.
+// Lines of a listener become messages of real robots. They come from files and terminals.
 #include "clients/doors/listener/listener.hpp"
 
 #include <fcntl.h>

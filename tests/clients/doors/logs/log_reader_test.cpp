@@ -104,7 +104,7 @@ TEST(LogReader, OneLineForEveryMistake) {
   for (const Bad& bad : cases) EXPECT_EQ(error_of(bad.text, bad.log), bad.error) << bad.text;
 }
 
-/// What is written is read, whatever the numbers.
+/// Random logs are read as they were written.
 TEST(LogReader, AWrittenLogIsReadAsItWas) {
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> number(-5000, 5000);
@@ -135,7 +135,7 @@ TEST(LogReader, AWrittenLogIsReadAsItWas) {
   }
 }
 
-/// Whatever a log holds, it is read or refused with a place; nothing else happens.
+/// Every log is read, or refused with a place.
 TEST(LogReader, RandomAndMutatedLogsAreReadOrRefused) {
   std::mt19937_64 random(11);
   const std::string good = kHeader + "33\t0\t1.5\t2\t1\t0.1\t0.2\n66\t0\t1.7\t2\t1\t0.1\t0.2\n";

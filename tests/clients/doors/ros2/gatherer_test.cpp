@@ -102,7 +102,7 @@ TEST_F(Gathering, TheTrackersOwnFrameNumbersStay) {
   EXPECT_EQ(frames.at(0).frame, 77u);
 }
 
-/// Whatever order messages come in: stamps of frames ascend, no robot is twice in a frame, and poses are conserved.
+/// In any order of the messages, stamps of frames ascend, no robot is twice in a frame, and poses are conserved.
 TEST_F(Gathering, ConservesPosesInAnyOrder) {
   std::mt19937_64 random(7);
   std::vector<std::pair<std::int64_t, std::uint32_t>> messages;

@@ -23,7 +23,7 @@ TEST(Snapshots, TheLastRobotOfATimeCompletesIt) {
   EXPECT_DOUBLE_EQ(all->time_s, 0.1);
   EXPECT_DOUBLE_EQ(all->poses[0].x_mm, 10);
   EXPECT_DOUBLE_EQ(all->poses[1].x_mm, 11);
-  EXPECT_FALSE(snapshots.add(state(0, 0.1, 10))) << "it was told";
+  EXPECT_FALSE(snapshots.add(state(0, 0.1, 10))) << "it was added before";
 }
 
 TEST(Snapshots, ALostSampleLeavesTheLastPose) {

@@ -213,7 +213,7 @@ TEST(BootLoader, ProtectsItself) {
   EXPECT_EQ(robot.mcu.outputs().led, 3);
 }
 
-/// What is written within a span that is repeated with other light does not stay; and a checkpoint has the pages.
+/// Pages written within a span that is repeated with other light do not stay. A checkpoint has the pages.
 TEST(BootLoader, PagesGoBackWithTheProcessorAndWithIt) {
   Robot robot(blank());
   robot.hear(kBoot);

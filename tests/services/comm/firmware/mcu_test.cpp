@@ -67,7 +67,7 @@ TEST(Mcu, RunsOnCommandAndDrivesMotorsAndLed) {
 }
 
 /// All that a robot shows and holds is the same at any time, whatever executes its instructions.
-TEST(Mcu, TheFastCoreGivesWhatLibsimavrGives) {
+TEST(Mcu, TheFastCoreAgreesWithLibsimavr) {
   const FlashImage programs[] = {
       talker(),
       firmware("#define DEBUG\n#include <debug.h>\n" +

@@ -15,7 +15,7 @@ constexpr std::uint8_t kBoot = 0x80, kSize = 0x82, kRun = 0x88;
 constexpr std::int64_t kPageTicks = 4;
 constexpr std::uint32_t kBlankLed = 3, kNewLed = 0x30, kGreen = 0x0c;
 
-/// What reaches a controller that reads the octets of these packets from its line.
+/// The messages that reach a controller that reads the octets of these packets from its line.
 class Line {
  public:
   void send(std::int64_t tick, const OverheadPacket& packet) {
