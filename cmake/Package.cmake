@@ -38,7 +38,6 @@ install(FILES deploy/package/lintian-overrides RENAME kilotwin DESTINATION ${CMA
 # The Python package is pure, for Debian's Python.
 install(DIRECTORY python/src/kilotwin DESTINATION lib/python3/dist-packages
   FILES_MATCHING PATTERN "*.py" PATTERN "py.typed" PATTERN "__pycache__" EXCLUDE)
-install(FILES deploy/package/kilotwin.bash RENAME kilotwin DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
 
 set(CPACK_PACKAGE_NAME kilotwin)
 set(CPACK_PACKAGE_CONTACT "${maintainer}")

@@ -8,6 +8,8 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
+import time
 import unittest
 import warnings
 from pathlib import Path
@@ -52,6 +54,12 @@ arena { width_mm: 500 height_mm: 500 }
 robots { count: 5 behaviour: "obeys.c" layout { grid { pitch_mm: 60 } } }
 """
 
+
+HUB = """
+name: "hub" duration_s: 3 arena { width_mm: 600 height_mm: 600 }
+robots { count: 4 behaviour: "%s" layout { grid { pitch_mm: 100 } } }
+station { environment { hub { } } } recording { event: STATION event: STATE }
+""" % (SOURCES / "behaviours/ark_hub.c")
 
 ENDS_THE_RUN = """
 #include <kilotwin_station.hpp>
@@ -113,6 +121,30 @@ class Package(unittest.TestCase):
         self.assertIn("led", set(run.events()["event"]))
         self.assertEqual(set(run.commands()["motion"]), {"stop"})
 
+    def test_the_stations_packets_and_logs_come_through_pandas(self):
+        (self.out / "e.txtpb").write_text(HUB)
+        run = kilotwin.run(self.out / "e.txtpb", out=self.out / "run")
+        packets = run.events(kinds="station")
+        self.assertEqual(list(packets), ["time_s", "event", "text"])
+        octets = [bytes.fromhex(text.removeprefix("0x")) for text in packets["text"]]
+        self.assertEqual({len(packet) for packet in octets}, {10})
+        # CSV makes no numbers of them, not even of those without a letter.
+        subprocess.run([PROGRAM, "export", run.directory, "--events", self.out / "e.csv"], check=True, capture_output=True)
+        read = pandas.read_csv(self.out / "e.csv")
+        self.assertEqual(list(read[read.event == "station"].text), list(packets["text"]))
+        self.assertTrue(any(text[2:].isdigit() for text in packets["text"]), "no packet of digits alone")
+        # Of one kind, whole numbers are whole.
+        subprocess.run([PROGRAM, "export", run.directory, "--events", self.out / "l.csv", "--kind", "state"], check=True, capture_output=True)
+        states = pandas.read_csv(self.out / "l.csv")
+        self.assertEqual(list(states.columns), ["time_s", "event", "robot", "group", "state"])
+        self.assertEqual(states.robot.dtype, np.int64)
+        self.assertEqual(list(states.state), list(run.events(["state"])["state"]))
+        logs = run.environment()
+        self.assertEqual(set(logs["name"]), {"hub"})
+        self.assertEqual(sorted(set(logs["robot"])), [0, 1, 2, 3])
+        with self.assertRaisesRegex(kilotwin.KilotwinError, "there are led, motion"):
+            run.events("leds")
+
     def test_a_sweep(self):
         done = kilotwin.sweep(EXPERIMENT, out=self.out / "sweep", seeds="1..2", robots=9, duration_s=1,
                               set={"robots.layout.grid.pitch_mm": [40, 45]})
@@ -135,6 +167,38 @@ class Package(unittest.TestCase):
         with self.assertRaisesRegex(kilotwin.KilotwinError, "no run came to its end: .*bad.cpp failed"):
             kilotwin.sweep(self.out / "e.txtpb", out=self.out / "sweep", seeds="1..2")
         self.assertEqual(len(kilotwin.Sweep(self.out / "sweep").table()), 2)
+
+    def test_a_strict_sweep_leaves_out_runs_with_failed_robots(self):
+        (self.out / "obeys.c").write_text(OBEYS.replace("seen_at_setup = gain", "if (kilo_uid == 2) *(volatile int*)8 = 1"))
+        (self.out / "e.txtpb").write_text(OBEYING)
+        words = {"set": {"robots.count": [2, 4]}, "plot": "spread", "colour_by": "robots.count", "duration_s": 1}
+        lenient = kilotwin.sweep(self.out / "e.txtpb", out=self.out / "lenient", **words)
+        self.assertEqual(list(lenient.table().robots_failed), [0, 1])
+        self.assertEqual(len(lenient.runs()), 2)
+        strict = kilotwin.sweep(self.out / "e.txtpb", out=self.out / "strict", strict=True, **words)
+        self.assertEqual(list(strict.table().well), [1, 0])
+        self.assertEqual([run.summary["robots"] for run in strict.runs()], [2])
+        if (self.out / "strict/sweep.svg").exists():
+            self.assertIn("spread", (self.out / "strict/sweep.svg").read_text())
+
+    def test_a_sweep_asks_slurm(self):
+        # Slurm's commands, which note how they were called.
+        tools = self.out / "tools"
+        tools.mkdir()
+        for name, text in [("squeue", "exit 0"), ("scancel", "exit 0"), ("sbatch", f'echo "$@" > {self.out}/asked; echo no; exit 1')]:
+            (tools / name).write_text(f"#!/bin/sh\n{text}\n")
+            (tools / name).chmod(0o755)
+        before = os.environ["PATH"]
+        os.environ["PATH"] = f"{tools}:{before}"
+        try:
+            with self.assertRaisesRegex(kilotwin.KilotwinError, "sbatch refused"):
+                kilotwin.sweep(EXPERIMENT, out=self.out / "sweep", robots=4, duration_s=1, slurm=["--time=0:10:00", "--mem=1G"],
+                               slurm_program="apptainer run k.sif")
+        finally:
+            os.environ["PATH"] = before
+        asked = (self.out / "asked").read_text()
+        self.assertIn("--time=0:10:00 --mem=1G", asked)
+        self.assertTrue((self.out / "sweep/commands").read_text().startswith("apptainer run k.sif run "))
 
     def test_a_run_without_a_directory_says_where_it_is(self):
         before = os.getcwd()
@@ -277,6 +341,51 @@ class Package(unittest.TestCase):
         with self.assertRaisesRegex(kilotwin.KilotwinError, "no run on domain"):
             kilotwin.join(domain, patience_s=0.5)
 
+    def test_a_run_is_joined_from_another_thread(self):
+        # The run ends when this thread stops it: so run() lets other threads go on meanwhile.
+        domain = free_domain()
+        done = []
+        options = {"robots": 4, "duration_s": 120, "mode": "federated", "domain": domain, "pace": 1}
+        runner = threading.Thread(target=lambda: done.append(kilotwin.run(EXPERIMENT, out=self.out / "run", **options)))
+        runner.start()
+        try:
+            with kilotwin.join(domain, patience_s=60) as live:
+                self.assertEqual(live.robots, 4)
+                self.assertEqual(done, [])
+                stopped_at = live.stop()["tick"]
+        finally:
+            runner.join()
+        self.assertEqual(done[0].summary["ticks"], stopped_at)
+        with self.assertRaisesRegex(ValueError, "local run has no DDS domain"):
+            kilotwin.run(EXPERIMENT, domain=domain)
+
+    def test_a_step_keeps_no_other_thread_waiting(self):
+        counted, counting, end = [0], threading.Event(), threading.Event()
+
+        def count():
+            while not end.is_set():
+                counted[0] += 1
+                counting.set()
+                time.sleep(0)
+
+        # So long, no thread is made to give way: the other one counts only while a call lets go of the interpreter.
+        interval = sys.getswitchinterval()
+        counter = threading.Thread(target=count)
+        with kilotwin.Arena(EXPERIMENT, robots=4, duration_s=3600) as arena:
+            counter.start()
+            counting.wait()
+            sys.setswitchinterval(1000)
+            try:
+                before = counted[0]
+                while counted[0] == before and not arena.ended:
+                    arena.step(1000)
+                after = counted[0]
+            finally:
+                sys.setswitchinterval(interval)
+                end.set()
+                counter.join()
+            self.assertGreater(after, before)
+
     def test_batteries_are_recorded_as_voltages(self):
         # 3.6 mA of 0.1 mAh: 1 % of the charge each second. From 0.4 to 0.2, the open-circuit voltage falls from 3.78 to 3.70 V.
         (self.out / "obeys.c").write_text(OBEYS.replace("*(volatile int*)8 = 1", ""))
@@ -297,6 +406,15 @@ class Package(unittest.TestCase):
         self.assertAlmostEqual(local.summary["observables"]["volts"], volts["battery_V"][-1], places=6)
         federated = kilotwin.run(self.out / "e.txtpb", mode="federated", out=self.out / "federated")
         np.testing.assert_array_equal(federated.variables()["battery_V"], volts["battery_V"])
+        # States are recorded at the same ticks here.
+        for run in [local, federated]:
+            poses = run.trajectories()
+            self.assertEqual(poses.units["battery_V"], "V")
+            known = np.isfinite(poses["battery_V"])
+            self.assertGreater(known.sum(), 30)
+            pairs = [dict(zip(zip(table["time_s"], table["robot"]), table["battery_V"])) for table in (poses, volts)]
+            for key, value in pairs[1].items():
+                self.assertEqual(pairs[0].get(key, value), value)
         # A caller's arena shows them too, also those of robots that run firmware.
         for avr in ["", " avr: true"] if shutil.which("avr-gcc") else [""]:
             (self.out / "arena.txtpb").write_text(text.replace("count: 2", "count: 2" + avr))

@@ -9,7 +9,7 @@ import shutil
 import tempfile
 import weakref
 from pathlib import Path
-from typing import Any, Mapping
+from typing import Any, Iterable, Mapping
 
 from kilotwin._program import call, common_words, text_of
 from kilotwin._table import Table
@@ -46,7 +46,8 @@ class Run:
         return self._tables[key]
 
     def trajectories(self, every_s: float = 1.0, measured: bool = False) -> Table:
-        """time_s, robot, x_mm, y_mm, heading_rad, led_r, led_g, led_b (0..3), group, state, failed: rows by time, then by robot.
+        """time_s, robot, x_mm, y_mm, heading_rad, led_r, led_g, led_b (0..3), group, state, failed, and battery_V if it was
+        recorded: rows by time, then by robot.
 
         every_s: seconds between a robot's rows, a multiple of the recorded interval. measured: poses as a tracker sees them.
         """
@@ -60,9 +61,18 @@ class Run:
         """time_s, robot, group, and a column per recorded variable of the programs."""
         return self._table("--variables")
 
-    def events(self) -> Table:
-        """time_s, event, robot, group, led_r, led_g, led_b, motor_left, motor_right, state, sender, distance_mm, text."""
-        return self._table("--events")
+    def events(self, kinds: str | Iterable[str] = ()) -> Table:
+        """time_s, event, robot, group, led_r, led_g, led_b, motor_left, motor_right, state, sender, distance_mm, text.
+
+        kinds: events of these kinds alone, with the columns that they have: "led", "motion", "state", "sent", "received",
+        "station", "failure".
+        """
+        names = [kinds] if isinstance(kinds, str) else list(kinds)
+        return self._table("--events", *(word for name in names for word in ("--kind", name)))
+
+    def environment(self) -> Table:
+        """environment, name, time_s, robot, colour, x, y, orientation_deg, value_1...: logs of the station's environments."""
+        return self._table("--environment")
 
     def commands(self) -> Table:
         """run, robot, time_s, motion: changes of motion, as `kilotwin identify` reads them."""
@@ -109,6 +119,8 @@ def run(
     define: Mapping[str, Any] | None = None,
     threads: int = 1,
     mode: str = "local",
+    domain: int | None = None,
+    pace: float | None = None,
     strict: bool = False,
     out: str | os.PathLike[str] | None = None,
     force: bool = False,
@@ -116,16 +128,23 @@ def run(
     """Runs an experiment to its end.
 
     set: fields of the experiment by path, such as {"robots[0].layout.grid.pitch_mm": 33}. define: macros of programs. threads: of a
-    local run; results do not depend on them. strict: raises where a robot's program fails. out: run directory; absent:
+    local run; results do not depend on them. mode: "local", or "federated" for a run over DDS, which `kilotwin.join(domain)` can look
+    at and steer from another thread. domain: of a federated run; absent: a free one. pace: simulated time over wall time; absent: as
+    fast as possible. strict: raises where a robot's program fails. out: run directory; absent:
     runs/NAME-SEED, with a number added if it exists. Raises KilotwinError.
     """
+    if domain is not None and mode != "federated":
+        raise ValueError("a local run has no DDS domain; give mode='federated'")
     words = ["run", os.fspath(experiment), "--mode", mode]
+    for option, value in [("--domain", domain), ("--pace", pace)]:
+        if value is not None:
+            words += [option, str(value)]
     if mode == "local":
         words += ["--threads", str(threads)]
     if seed is not None:
         words += ["--seed", str(seed)]
-    for field, value in (set or {}).items():
-        words += ["--set", f"{field}={text_of(value)}"]
+    for field, setting in (set or {}).items():
+        words += ["--set", f"{field}={text_of(setting)}"]
     words += common_words(robots=robots, behaviour=behaviour, duration_s=duration_s, model=model, define=define, out=out, force=force)
     if strict:
         words.append("--strict")

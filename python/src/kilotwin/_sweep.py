@@ -22,7 +22,7 @@ class Sweep:
         self.directory = Path(directory)
 
     def runs(self) -> list[Run]:
-        """The runs that came to their end, by point and seed."""
+        """The runs that came to their end, by point and seed; of a strict sweep, those without failed robots."""
         # The table names a run's directory as the command saw it, from the folder where it ran.
         return [Run(self.directory / Path(row["directory"]).name) for row in self._rows() if row["well"] == "1"]
 
@@ -53,6 +53,11 @@ def sweep(
     models: Sequence[str | os.PathLike[str]] = (),
     goal: str | None = None,
     define: Mapping[str, Any] | None = None,
+    plot: str | None = None,
+    colour_by: str | None = None,
+    strict: bool = False,
+    slurm: bool | Sequence[str] = False,
+    slurm_program: str | None = None,
     resume: bool = False,
     force: bool = False,
 ) -> Sweep:
@@ -61,8 +66,9 @@ def sweep(
     seeds: "1..20". set: per field a list of values, or a text such as "10..200:10" or "log:0.01..10:7". latin: so many points of a
     Latin hypercube over the ranges in place of all combinations. models: files, or directories of them; every point runs with each, and
     `table("designs")` ranks the points by their worst model, where the `goal` says which value is better: "largest" or "smallest".
-    resume: goes on with the sweep in `out`. Runs that fail are
-    listed in the table; the others are there. Raises KilotwinError for wrong input, or if no run came to its end.
+    plot: the observable of the plots. colour_by: a swept field, or "group": a curve for each of its values. strict: a run in which robots
+    failed counts as failed. slurm: runs as an array job of Slurm; options for sbatch in a list, such as ["--time=1:00:00"].
+    slurm_program: what starts kilotwin on its nodes, such as "apptainer run /shared/kilotwin.sif"; absent: this program. resume: goes on with the sweep in `out`. Runs that fail are listed in the table; the others are there. Raises KilotwinError for wrong input, or if no run came to its end.
     """
     words = ["sweep", os.fspath(experiment)]
     if seeds is not None:
@@ -70,9 +76,15 @@ def sweep(
     for field, values in (set or {}).items():
         text = values if isinstance(values, str) else ",".join(text_of(value) for value in values)
         words += ["--set", f"{field}={text}"]
-    for option, value in [("--latin", latin), ("--jobs", jobs)]:
+    for option, value in [("--latin", latin), ("--jobs", jobs), ("--plot", plot), ("--colour-by", colour_by), ("--slurm-program", slurm_program)]:
         if value is not None:
             words += [option, str(value)]
+    if strict:
+        words.append("--strict")
+    if slurm or isinstance(slurm, Sequence):
+        words.append("--slurm")
+    if isinstance(slurm, Sequence):
+        words += [f"--slurm-option={option}" for option in slurm]
     if models:
         words += ["--models", *(os.fspath(file) for file in models)]
     if goal is not None:

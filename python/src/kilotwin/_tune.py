@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
-from kilotwin._program import call, common_words, text_of
+from kilotwin._program import common_words, ended, error_of, text_of
 
 if TYPE_CHECKING:
     import pandas
@@ -69,12 +69,14 @@ def tune(
     worst: bool = False,
     set: Mapping[str, Any] | None = None,
     define: Mapping[str, Any] | None = None,
+    strict: bool = False,
     force: bool = False,
 ) -> Tuned:
     """Searches the values of fields and macros that make an observable largest or smallest, by CMA-ES.
 
     vary, vary_define: per field or macro its range, such as "10..200" or "log:0.1..10". seeds: runs per point. budget: runs in all.
-    models: files, or directories of them; each point runs with all, and the mean counts, or with `worst` the worst. Raises KilotwinError for wrong input.
+    models: files, or directories of them; each point runs with all, and the mean counts, or with `worst` the worst. strict: a run in
+    which robots failed counts as failed. Raises KilotwinError for wrong input, or if no run of the first points succeeded.
     """
     if (maximise is None) == (minimise is None):
         raise ValueError("give maximise or minimise")
@@ -93,5 +95,10 @@ def tune(
     if worst:
         words.append("--worst")
     words += common_words(robots=robots, behaviour=behaviour, duration_s=duration_s, model=model, define=define, out=out, force=force)
-    call(words)
+    if strict:
+        words.append("--strict")
+    status, _, said = ended(words)
+    # With `strict` the status is 1 also where some runs failed, and the result is there.
+    if status != 0 and not (strict and status == 1 and (Path(out) / "tune.json").exists()):
+        raise error_of(status, said)
     return Tuned(out)
