@@ -15,17 +15,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::string kMain = "int main() { kilo_init(); kilo_start(setup, loop); return 0; }\n";
 /// A program that shows the colour that a further source holds.
 const std::string kIncomplete =
     "#include <kilolib.h>\nint colour(void);\nvoid setup() {} void loop() { set_color(colour()); }\n" + kMain;
 
 std::string colour_source(int colour) { return "int colour(void) { return " + std::to_string(colour) + "; }\n"; }
-
-bool mentions(const std::vector<std::string>& lines, const std::string& text) {
-  return std::any_of(lines.begin(), lines.end(),
-                     [&](const std::string& line) { return line.find(text) != std::string::npos; });
-}
 
 bool has_avr_gcc() { return !os::find_executable("avr-gcc").empty(); }
 

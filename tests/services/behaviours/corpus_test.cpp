@@ -25,7 +25,6 @@ class Corpus : public testing::TestWithParam<fs::path> {};
 TEST_P(Corpus, BuildsAndRuns) {
   constexpr std::uint32_t kRobots = 50;
   constexpr int kTicks = 1832;
-  constexpr std::uint8_t kRed = 0x03;
   Swarm swarm({GetParam().string()}, kRobots);
   swarm.start();
   for (int tick = 0; tick < kTicks; ++tick) swarm.step(tick < 100 ? echo(swarm.frame()) : Air{});

@@ -16,13 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::string kMain = "int main() { kilo_init(); kilo_start(setup, loop); return 0; }\n";
-
-bool mentions(const std::vector<std::string>& lines, const std::string& text) {
-  return std::any_of(lines.begin(), lines.end(),
-                     [&](const std::string& line) { return line.find(text) != std::string::npos; });
-}
-
 /// The LED after three ticks of one robot.
 std::uint8_t led_of(const fs::path& source) {
   Swarm swarm({source.string()}, 1);

@@ -11,12 +11,6 @@
 namespace kilotwin::behaviours::test {
 namespace {
 
-Air to_all(const Swarm& swarm, const IrMessage& what) {
-  Air air;
-  for (std::uint32_t robot = 0; robot < swarm.plan->robots(); ++robot) air.receptions.push_back({robot, what});
-  return air;
-}
-
 TEST(Engine, RobotsAreIdleUntilRun) {
   Swarm swarm({program("static void setup(void) { set_color(1); set_motors(10, 20); }\nstatic void loop(void) { "
                        "set_color(2); }")},

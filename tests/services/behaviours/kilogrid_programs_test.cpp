@@ -42,11 +42,6 @@ const std::string kModule =
 /// Index of a message's type, after nine octets of data.
 constexpr std::size_t kType = 9;
 
-bool mentions(const std::vector<std::string>& lines, const std::string& text) {
-  return std::any_of(lines.begin(), lines.end(),
-                     [&](const std::string& line) { return line.find(text) != std::string::npos; });
-}
-
 /// Makes robot 0 the cell with that number of the module (3, 1), whose configuration is red, green, blue, white.
 void make_cell(proto::Manifest& manifest, char number) {
   std::array<std::uint8_t, KILOTWIN_EEPROM_OCTETS> octets;

@@ -13,7 +13,6 @@ namespace {
 constexpr std::uint8_t kBoot = 0x80, kBootPage = 0x81, kBootSize = 0x82, kCharge = 0x86, kCalib = 0x8A,
                        kUnknown = 0x8B, kUser = 5;
 constexpr std::uint8_t kSave = 0, kUid = 1, kTurnLeft = 2, kTurnRight = 3, kStraight = 4;
-constexpr std::uint8_t kGreen = 0x0C;
 
 Air heard(const IrMessage& what) {
   Air air;
@@ -49,16 +48,10 @@ void listen(Swarm& swarm) {
   for (int i = 0; i < 300 && swarm.life_cycle(0) == LifeCycle::kSleeping; ++i) swarm.step();
 }
 
-Air all_hear(const Swarm& swarm, const IrMessage& what) {
-  Air air;
-  for (std::uint32_t robot = 0; robot < swarm.plan->robots(); ++robot) air.receptions.push_back({robot, what});
-  return air;
-}
-
 /// Brings robots that have run once into a state by messages alone; sleeping ones to where they listen.
 void bring(Swarm& swarm, LifeCycle state) {
   swarm.start();
-  const auto tell = [&](const IrMessage& what) { swarm.step(all_hear(swarm, what)); };
+  const auto tell = [&](const IrMessage& what) { swarm.step(to_all(swarm, what)); };
   switch (state) {
     case LifeCycle::kSleeping:
       tell(message(kSleep));
@@ -151,7 +144,7 @@ TEST_P(LifeCycles, FollowEveryMessageAsTheFirmwareDoes) {
   }
   // A robot can report its counters only while it runs, and a sleeping robot must listen first.
   swarm.steps(from == LifeCycle::kSleeping ? 250 : 245);
-  for (int repeat = 0; repeat < 2; ++repeat) swarm.step(all_hear(swarm, message(kRun)));
+  for (int repeat = 0; repeat < 2; ++repeat) swarm.step(to_all(swarm, message(kRun)));
   swarm.steps(7);
   Air ask;
   for (std::uint32_t n = 0; n < kRobots; ++n) ask.ask.push_back(n);

@@ -13,8 +13,6 @@ struct Odd {
 };
 void PrintTo(const Odd& odd, std::ostream* out) { *out << odd.name; }
 
-constexpr std::uint8_t kRed = 0x03;
-
 class OddPrograms : public testing::TestWithParam<Odd> {};
 
 TEST_P(OddPrograms, RunFiveSecondsOnFiveRobots) {

@@ -7,12 +7,6 @@
 namespace kilotwin::behaviours::test {
 namespace {
 
-Air to_all(const Swarm& swarm, const IrMessage& what) {
-  Air air;
-  for (std::uint32_t robot = 0; robot < swarm.plan->robots(); ++robot) air.receptions.push_back({robot, what});
-  return air;
-}
-
 /// A program that waits for a message with `wait` and counts in its left motor.
 void waits_for_a_message(const std::string& wait) {
   Swarm swarm({program("static uint8_t received; static uint8_t n;\n"

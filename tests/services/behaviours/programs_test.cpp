@@ -6,10 +6,6 @@
 namespace kilotwin::behaviours::test {
 namespace {
 
-constexpr std::uint8_t kRed = 0x03, kGreen = 0x0C, kBlue = 0x30;
-
-std::string ready_made(const std::string& name) { return std::string(KILOTWIN_BEHAVIOURS) + "/" + name; }
-
 bool moves(const ActuationFrame& frame, std::uint32_t robot) {
   return frame.motor_left[robot] != 0 || frame.motor_right[robot] != 0;
 }

@@ -11,7 +11,7 @@ namespace kilotwin::behaviours::test {
 namespace {
 
 /// Robot 0's message if the radio requests one in this tick.
-IrMessage asked(Swarm& swarm, Air air = {}) {
+IrMessage sent_message(Swarm& swarm, Air air = {}) {
   air.ask = {0};
   swarm.step(air);
   const IrMessage said = swarm.frame().offer_message.at(0);
@@ -39,7 +39,7 @@ TEST(Readings, AVoltageReplacesTheNextMessagesStrength) {
     swarm.step(air);
     Air next;
     next.receptions = {{0, message(0, 2)}};
-    const IrMessage first = asked(swarm, next), second = asked(swarm, next);
+    const IrMessage first = sent_message(swarm, next), second = sent_message(swarm, next);
     const auto word = [](const IrMessage& m, std::size_t i) { return m[i] | m[i + 1] << 8; };
     EXPECT_EQ(word(first, 2), 300);
     EXPECT_EQ(word(second, 0), 400) << "the one after is right again";
@@ -66,7 +66,7 @@ TEST(Readings, FailForAsLongAsAMessageIsReceived) {
   Air air;
   air.receptions = {{0, message(0)}};
   for (int i = 0; i < kTicks; ++i) swarm.step(air);
-  const IrMessage m = asked(swarm);
+  const IrMessage m = sent_message(swarm);
   const double n = m[2] | m[3] << 8, busy = m[0] | m[1] << 8, p = 34970.0 / 262144;
   EXPECT_GE(n, kTicks);
   EXPECT_NEAR(busy / n, p, 4 * std::sqrt(p * (1 - p) / n))
@@ -100,7 +100,7 @@ TEST(Readings, FailDuringMessagesIfLoopRunsAsOnTheRobot) {
     Air air;
     for (int i = 0; i < messages; ++i) air.receptions.push_back({0, message(0)});
     for (int k = 0; k < 50; ++k) swarm.step(air);
-    const IrMessage m = asked(swarm, air);
+    const IrMessage m = sent_message(swarm, air);
     return static_cast<double>(m[0] | m[1] << 8 | m[2] << 16);
   };
   EXPECT_NEAR(succeeded(3) / succeeded(0), 1 - 3 * 34970.0 / 262144, 0.02);
@@ -129,7 +129,7 @@ TEST(Readings, HardRandomOctetsAreUniform) {
   swarm.start();
   swarm.steps(3000);  // rand_hard() takes many cycles
   for (int b = 0; b < 8; ++b) {
-    const IrMessage m = asked(swarm);
+    const IrMessage m = sent_message(swarm);
     ASSERT_EQ(m[0], b);
     EXPECT_NEAR(m[1] | m[2] << 8 | m[3] << 16, 10000, 4.5 * std::sqrt(5000.0)) << b;
   }

@@ -10,12 +10,6 @@
 namespace kilotwin::behaviours::test {
 namespace {
 
-Air all_hear(const Swarm& swarm, const IrMessage& what) {
-  Air air;
-  for (std::uint32_t robot = 0; robot < swarm.plan->robots(); ++robot) air.receptions.push_back({robot, what});
-  return air;
-}
-
 /// A program that reports 4 octets of `value` (an int32_t) through messages.
 std::string reporting(const std::string& text) {
   return program(
@@ -139,7 +133,7 @@ TEST(RobotSenses, AFlatRobotIsOffAndRestartsOnceItIsCharged) {
   EXPECT_EQ(swarm.life_cycle(1), LifeCycle::kIdle);
   EXPECT_NE(swarm.hash(), hash);
   swarm.steps(30);
-  swarm.step(all_hear(swarm, message(kRun)));
+  swarm.step(to_all(swarm, message(kRun)));
   EXPECT_EQ(swarm.led(1), 1) << "its memory was lost";
   EXPECT_EQ(swarm.life_cycle(0), LifeCycle::kFlat);
 }
@@ -151,7 +145,7 @@ TEST(RobotSenses, TheBatteryStateShowsTheFirmwaresColours) {
     Swarm swarm({program("")}, 1, 1,
                 std::string("battery { resistance_ohm: 0 reading_sd: 0 charge: ") + charge + " }");
     swarm.start();
-    swarm.step(all_hear(swarm, message(kVoltage)));
+    swarm.step(to_all(swarm, message(kVoltage)));
     EXPECT_EQ(swarm.led(0), led) << charge;
   }
 }

@@ -50,6 +50,13 @@ std::string program(const std::string& body) {
          "  kilo_start(setup, loop); return 0; }\n";
 }
 
+bool mentions(const std::vector<std::string>& lines, const std::string& text) {
+  return std::any_of(lines.begin(), lines.end(),
+                     [&](const std::string& line) { return line.find(text) != std::string::npos; });
+}
+
+std::string ready_made(const std::string& name) { return std::string(KILOTWIN_BEHAVIOURS) + "/" + name; }
+
 IrMessage message(std::uint8_t type, std::uint8_t first_octet) {
   IrMessage result{};
   result[0] = first_octet;
@@ -186,6 +193,12 @@ bool equal(const ActuationFrame& a, const ActuationFrame& b) {
   return a.motor_left == b.motor_left && a.motor_right == b.motor_right && a.led == b.led &&
          a.life_cycle == b.life_cycle && a.tx_period == b.tx_period && a.spin_up == b.spin_up &&
          a.offer_robot == b.offer_robot && a.offer_message == b.offer_message;
+}
+
+Air to_all(const Swarm& swarm, const IrMessage& what) {
+  Air air;
+  for (std::uint32_t robot = 0; robot < swarm.plan->robots(); ++robot) air.receptions.push_back({robot, what});
+  return air;
 }
 
 }  // namespace kilotwin::behaviours::test

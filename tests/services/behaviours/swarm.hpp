@@ -38,6 +38,16 @@ class Folder {
 inline constexpr std::uint8_t kReset = 0x83, kSleep = 0x84, kWakeup = 0x85, kVoltage = 0x87, kRun = 0x88,
                               kReadUid = 0x89;
 
+/// Main function of a program with setup() and loop().
+inline const std::string kMain = "int main() { kilo_init(); kilo_start(setup, loop); return 0; }\n";
+/// LED colours of frames.
+inline constexpr std::uint8_t kRed = 0x03, kGreen = 0x0C, kBlue = 0x30;
+
+/// Whether one of the lines contains a text.
+[[nodiscard]] bool mentions(const std::vector<std::string>& lines, const std::string& text);
+/// The path of a program of behaviours/.
+[[nodiscard]] std::string ready_made(const std::string& name);
+
 /// The radio's input to all robots in one tick.
 struct Air {
   struct Reception {
@@ -87,5 +97,8 @@ class Swarm {
 [[nodiscard]] Air echo(const ActuationFrame& frame);
 
 [[nodiscard]] bool equal(const ActuationFrame& a, const ActuationFrame& b);
+
+/// All robots hear a message.
+[[nodiscard]] Air to_all(const Swarm&, const IrMessage&);
 
 }  // namespace kilotwin::behaviours::test

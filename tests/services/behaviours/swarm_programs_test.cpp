@@ -11,9 +11,7 @@
 namespace kilotwin::behaviours::test {
 namespace {
 
-constexpr std::uint8_t kOff = 0, kRed = 0x03, kGreen = 0x0C, kBlue = 0x30, kWhite = 0x3F;
-
-std::string ready_made(const std::string& name) { return std::string(KILOTWIN_BEHAVIOURS) + "/" + name; }
+constexpr std::uint8_t kOff = 0, kWhite = 0x3F;
 
 struct Place {
   double x_mm, y_mm;
