@@ -42,7 +42,8 @@ Count count_in(const DrawnScene& scene, double zoom) {
   for (const DrawnRobot& robot : scene.robots) {
     for (const Detection& detection : found) {
       // The middle of the first pixel is (0, 0) in both pictures.
-      const double x = (detection.disc.centre.x_px + 0.5) / zoom - 0.5, y = (detection.disc.centre.y_px + 0.5) / zoom - 0.5;
+      const double x = (detection.disc.centre.x_px + 0.5) / zoom - 0.5,
+                   y = (detection.disc.centre.y_px + 0.5) / zoom - 0.5;
       if (std::hypot(x - robot.disc.centre.x_px, y - robot.disc.centre.y_px) > 0.3 * robot.disc.radius_px) continue;
       ++count.found;
       break;

@@ -43,7 +43,7 @@ struct Track {
   // What only the follower uses.
   StraightPath path;
   std::optional<Led> led_read{};  ///< of the last picture
-  int frames = 0, hits = 0;  ///< while it is not confirmed
+  int frames = 0, hits = 0;       ///< while it is not confirmed
 };
 
 struct FollowLimits {

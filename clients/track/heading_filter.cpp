@@ -36,6 +36,8 @@ constexpr double kKnownAfter_s = 5;
 constexpr double kHeldHeadingNoise = 0.05, kHeldVelocityNoise = 5;
 /// Density of the noise of the turn rate of a robot that turns in place, (rad/s)^2/s.
 constexpr double kTurnedNoise = 0.3;
+/// More than twice what both motors could do.
+constexpr double kMostTurn_rad_s = 4;
 /// Densities of the noise while a mode lasts, per second: of the axle along its heading mm^2, heading rad^2, position otherwise mm^2,
 /// speed (mm/s)^2, turn rate (rad/s)^2. The first two are those of wheels that let the heading wander by 1.4 degrees in a second.
 constexpr double kAlongNoise = 0.1, kHeadingNoise = 6e-4, kOtherNoise = 0.01, kSpeedNoise = 0.3, kTurnNoise = 1e-3;
@@ -199,6 +201,14 @@ void HeadingFilter::predict(double dt_s) {
   }
 }
 
+/// `turns`: the last component is a turn rate. Between two pictures a faster turn would look like a slower one, so that a rate once
+/// wrong would grow without bound.
+void HeadingFilter::correct(Hypothesis& h, const Vector& change, bool turns) {
+  h.state += change;
+  h.state(2) = wrapped(h.state(2));
+  if (turns) h.state(4) = std::clamp(h.state(4), -kMostTurn_rad_s, kMostTurn_rad_s);
+}
+
 void HeadingFilter::measure(double x_mm, double y_mm, double sd_mm) {
   std::array<double, kModes> likelihoods{};
   for (std::size_t i = 0; i < kModes; ++i) {
@@ -209,8 +219,7 @@ void HeadingFilter::measure(double x_mm, double y_mm, double sd_mm) {
     const Eigen::Vector2d innovation(x_mm - h.state(0), y_mm - h.state(1));
     const Eigen::Matrix2d inverse = total.inverse();
     const Eigen::Matrix<double, 5, 2> gain = h.covariance.leftCols<2>() * inverse;
-    h.state += gain * innovation;
-    h.state(2) = wrapped(h.state(2));
+    correct(h, gain * innovation, i != kHeld);
     h.covariance -= gain * h.covariance.topRows<2>();
     h.covariance = 0.5 * (h.covariance + h.covariance.transpose()).eval();
     likelihoods[i] = -0.5 * innovation.dot(inverse * innovation) - 0.5 * std::log(total.determinant());
@@ -227,8 +236,7 @@ void HeadingFilter::measure_bearing(double bearing_rad, double sd_rad) {
     const double innovation = wrapped(bearing_rad - h.state(2));
     const double total = h.covariance(2, 2) + sd_rad * sd_rad;
     const Vector gain = h.covariance.col(2) / total;
-    h.state += gain * innovation;
-    h.state(2) = wrapped(h.state(2));
+    correct(h, gain * innovation, i != kHeld);
     const Matrix change = gain * h.covariance.row(2);
     h.covariance -= change;
     h.covariance = 0.5 * (h.covariance + h.covariance.transpose()).eval();

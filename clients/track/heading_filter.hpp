@@ -49,6 +49,7 @@ class HeadingFilter {
   void predict(double dt_s);
   static void predict_held(Hypothesis& h, double dt_s);
   static void predict_turned(Hypothesis& h, double dt_s);
+  static void correct(Hypothesis& h, const Vector& change, bool turns);
   void measure(double x_mm, double y_mm, double sd_mm);
   void measure_bearing(double bearing_rad, double sd_rad);
   void weigh(const std::array<double, kModes>& log_likelihoods);

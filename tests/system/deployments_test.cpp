@@ -30,7 +30,7 @@ namespace fs = std::filesystem;
 
 const Ceiling kCeiling{700, 500};
 constexpr int kRobots = 5;
-constexpr std::size_t kSimulated = 6;  // of deployment d
+constexpr std::size_t kSimulated = 6;   // of deployment d
 constexpr double kPictures_per_s = 24;  // simulated
 constexpr double kDegree = kPi / 180;
 
@@ -313,8 +313,8 @@ class Deployments : public testing::Test {
   std::unique_ptr<Process> start_camera() {
     fs::remove(scratch_ / "ceiling.jpg");
     return start(KILOTWIN_VISION, {"cameras", "--domain", there_, "--picture", scratch_ / "ceiling.jpg", "--size",
-                                   kCeiling.size(), "--fps", fmt::format("{}", kPictures_per_s * pace_), "--noise", "3",
-                                   "--blur", "0.7", "--uneven-light", "0.2"});
+                                   kCeiling.size(), "--fps", fmt::format("{}", kPictures_per_s * pace_), "--noise",
+                                   "3", "--blur", "0.7", "--uneven-light", "0.2"});
   }
   std::unique_ptr<Process> start_tracker(const Words& more = {}) {
     Words words{"track",

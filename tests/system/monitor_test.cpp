@@ -71,7 +71,8 @@ std::vector<std::vector<Pose>> frames_of(const std::filesystem::path& table) {
 /// Publishes the frames at the pace of the run, which it learns from the run's status.
 class Player {
  public:
-  Player(const dds::Participant& participant, const std::vector<std::vector<Pose>>& frames, Shift knock, double pace)
+  Player(const dds::Participant& participant, const std::vector<std::vector<Pose>>& frames, Shift knock,
+         double pace)
       : frames_(frames),
         knock_(knock),
         pace_(pace),
@@ -186,10 +187,10 @@ class MonitoredRun : public testing::Test {
   bool watch(const std::vector<std::vector<Pose>>& frames, Shift knock, double pace, Json& summary) {
     std::filesystem::remove_all(scratch_ / "run");
     const Player player(domain_.participant, frames, knock, pace);
-    Process process({program(), "run", scratch_ / "watched.txtpb", "--pace", std::to_string(pace), "--duration",
-                     std::to_string(kDuration_s), "--domain", domain_.name, "--out", scratch_ / "run",
-                     "--quiet", "--monitor"},
-                    scratch_.path());
+    Process process(
+        {program(), "run", scratch_ / "watched.txtpb", "--pace", std::to_string(pace), "--duration",
+         std::to_string(kDuration_s), "--domain", domain_.name, "--out", scratch_ / "run", "--quiet", "--monitor"},
+        scratch_.path());
     const Outcome outcome = process.wait(200);
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     printed_ = outcome.err;

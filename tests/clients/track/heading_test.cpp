@@ -138,6 +138,32 @@ INSTANTIATE_TEST_SUITE_P(Conditions, HeadingOf,
                                          Condition{0.6, 1 / 30.0}, Condition{0.1, 1 / 30.0, 150, true},
                                          Condition{0.3, 1 / 30.0, 150, true}));
 
+/// Robots that others push jump by many times the stated error. No hypothesis may run away: wrapped() would not return.
+TEST(Headings, StayBoundedWherePositionsJump) {
+  constexpr double kStep_s = 0.1, kStated_mm = 0.02, kJump_mm = 0.6;
+  for (std::uint64_t seed = 0; seed < 6; ++seed) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> noise(0, 1);
+    Robot robot;
+    HeadingFilter filter;
+    for (int i = 0; i < 6000; ++i) {
+      const int turn = static_cast<int>(random() % 4);
+      robot.drive(turn == 1 ? 0 : 10, turn == 2 ? 0 : 10, kStep_s);
+      const double jump_mm = i % 37 == 0 ? kJump_mm : kStated_mm;
+      const double x = robot.centre_x() + jump_mm * noise(random),
+                   y = robot.centre_y() + kStated_mm * noise(random);
+      const bool lit = i / 100 % 3 != 0;
+      const double seen = wrapped(std::remainder(robot.heading_rad, 2 * kPi) + 0.1 * noise(random));
+      if (lit)
+        filter.update(i * kStep_s, x, y, kStated_mm, seen, 0.1);
+      else
+        filter.update(i * kStep_s, x, y, kStated_mm);
+    }
+    ASSERT_TRUE(filter.heading());
+    EXPECT_LT(std::abs(std::remainder(filter.heading()->heading_rad - robot.heading_rad, 2 * kPi)), 0.3) << seed;
+  }
+}
+
 /// The hypothesis that only seen headings can speak for must not run away meanwhile.
 TEST(Headings, ArePossibleAgainAfterAnHourInTheDark) {
   constexpr double kStep_s = 0.1, kLit_s = 20, kDark_s = 3600;
