@@ -1,4 +1,4 @@
-/// What `kilotwin run --view` records beyond the experiment's own recording, so that the page can show it.
+/// The recording that `kilotwin run --view` adds to that of the experiment, for the page.
 #pragma once
 
 #include <string>

@@ -169,10 +169,10 @@ int run(RunOptions arguments, double started_s) {
                                              recorder::RunDirectory::default_path(summary.name, summary.seed));
     if (!arguments.quiet) fmt::print("{}", recorder::summary_text(summary, place));
     if (arguments.strict && summary.robots_failed > 0) {
-      throw RunError(
-          fmt::format("{} of {} robots failed, and --strict was given; \"failures\" of {} says who, when and "
-                      "where",
-                      summary.robots_failed, summary.robots, prepared.directory.summary().string()));
+      throw RunError(fmt::format(
+          "{} of {} robots failed, and --strict was given; \"failures\" of {} says who, when and "
+          "where",
+          summary.robots_failed, summary.robots + summary.cells, prepared.directory.summary().string()));
     }
   }
   if (page) view_until_interrupted(*page);

@@ -173,8 +173,8 @@ void add_verdict(Data& page, const RunPlan& plan, const Summary& s) {
   } else {
     outcome += ":";
   }
-  rest += fmt::format("; {} of {} failed; state hash {:016x}", counted(s.robots_failed, "robot"), s.robots,
-                      s.state_hash);
+  rest += fmt::format("; {} of {} failed; state hash {:016x}", counted(s.robots_failed, "robot"),
+                      s.robots + s.cells, s.state_hash);
   page.set("outcome", outcome);
   page.set("verdict", rest);
   if (!s.failure.empty() || s.robots_failed > 0) page.set("bad", Data{Data::type::bool_true});
@@ -261,7 +261,7 @@ void add_failures(Data& page, const Summary& s) {
                html::escaped(s.failures[i].text)});
   }
   Data failures{Data::type::object};
-  failures.set("lead", fmt::format("{} of {} failed{}.", counted(s.robots_failed, "robot"), s.robots,
+  failures.set("lead", fmt::format("{} of {} failed{}.", counted(s.robots_failed, "robot"), s.robots + s.cells,
                                    shown < s.robots_failed
                                        ? fmt::format("; the first {} are listed, more are in summary.json", shown)
                                        : ""));

@@ -466,8 +466,9 @@ identification::Result result_of(const Findings& f, const MeasuredSet& judged, d
   if (const double lag_s = after.base.command_lag_s; lag_s != 0) {
     out.mutable_command_lag()->set_lag_s(lag_s);
     if (f.command_lag_s) {
-      out.mutable_command_lag()->set_low_s(f.command_lag_s->first);
-      out.mutable_command_lag()->set_high_s(f.command_lag_s->second);
+      const auto [low_s, high_s] = *f.command_lag_s;
+      if (std::isfinite(low_s)) out.mutable_command_lag()->set_low_s(low_s);
+      if (std::isfinite(high_s)) out.mutable_command_lag()->set_high_s(high_s);
     }
     out.mutable_command_lag()->set_in_words(
         fmt::format("The tracks follow the commands {:.3f} s {} than stamped. The fit allows for it; check the "

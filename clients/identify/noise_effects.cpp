@@ -10,6 +10,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <tuple>
 #include <utility>
 
 #include "clients/identify/model/effect_records.hpp"
@@ -35,8 +36,9 @@ struct Candidate {
   std::vector<std::string> covariates;
   Eigen::MatrixXd columns;         ///< samples x columns
   std::vector<std::size_t> folds;  ///< of each sample; below kFolds
-  /// The factor of the standard deviation as a function of the model file.
-  std::function<proto::Function(const Eigen::VectorXd& coefficients)> scale;
+  /// The factor of the standard deviation as a function of the model file. `level`: the log variance that all samples share, beside
+  /// the coefficients.
+  std::function<proto::Function(const Eigen::VectorXd& coefficients, double level)> scale;
 };
 constexpr std::size_t kFolds = 6;
 
@@ -71,13 +73,13 @@ Candidate of_robots(const Samples& samples) {
     out.columns(static_cast<Eigen::Index>(i), column[samples[i].robot]) = 1;
     out.folds.push_back((stretch_of(samples[i]) + samples[i].track) % kFolds);
   }
-  out.scale = [robots](const Eigen::VectorXd& coefficients) {
+  out.scale = [robots](const Eigen::VectorXd& coefficients, double level) {
     proto::Function f;
     f.set_of(proto::Function::ROBOT);
-    f.mutable_table()->set_otherwise(1);
+    f.mutable_table()->set_otherwise(rounded(std::exp(0.5 * level)));
     for (std::size_t r = 0; r < robots.size(); ++r) {
       f.mutable_table()->add_key(robots[r]);
-      f.mutable_table()->add_value(rounded(std::exp(0.5 * coefficients[static_cast<Eigen::Index>(r)])));
+      f.mutable_table()->add_value(rounded(std::exp(0.5 * (level + coefficients[static_cast<Eigen::Index>(r)]))));
     }
     return f;
   };
@@ -102,21 +104,21 @@ Candidate of_time(const Samples& samples) {
   Candidate out{"noise-by-time", {"time"}, {}, folds_by_robot(samples), {}};
   const auto range = range_of(samples, [](const NoiseSample& s) { return s.time_s; });
   const auto row = [range](double time_s) {
-    Eigen::RowVectorXd r(kTimeOrder);
-    for (int k = 1; k <= kTimeOrder; ++k) r[k - 1] = cosine(k, time_s, range);
+    Eigen::RowVectorXd r(kTimeOrder + 1);
+    for (int k = 0; k <= kTimeOrder; ++k) r[k] = cosine(k, time_s, range);
     return r;
   };
-  out.columns.resize(static_cast<Eigen::Index>(samples.size()), kTimeOrder);
+  out.columns.resize(static_cast<Eigen::Index>(samples.size()), kTimeOrder + 1);
   for (std::size_t i = 0; i < samples.size(); ++i)
     out.columns.row(static_cast<Eigen::Index>(i)) = row(samples[i].time_s);
-  out.scale = [row, range](const Eigen::VectorXd& coefficients) {
+  out.scale = [row, range](const Eigen::VectorXd& coefficients, double level) {
     constexpr int kKnots = 25;
     proto::Function f;
     f.set_of(proto::Function::TIME);
     for (int i = 0; i < kKnots; ++i) {
       const double time_s = range.first + (range.second - range.first) * i / (kKnots - 1);
       f.mutable_spline()->add_knot(rounded(time_s));
-      f.mutable_spline()->add_value(rounded(std::exp(0.5 * row(time_s).dot(coefficients))));
+      f.mutable_spline()->add_value(rounded(std::exp(0.5 * (level + row(time_s).dot(coefficients)))));
     }
     return f;
   };
@@ -130,15 +132,14 @@ Candidate of_place(const Samples& samples) {
   const auto row = [xs, ys](double x_mm, double y_mm) {
     std::vector<double> values;
     for (int j = 0; j <= kPlaceOrder; ++j)
-      for (int k = 0; j + k <= kPlaceOrder; ++k)
-        if (j + k > 0) values.push_back(cosine(j, x_mm, xs) * cosine(k, y_mm, ys));
+      for (int k = 0; j + k <= kPlaceOrder; ++k) values.push_back(cosine(j, x_mm, xs) * cosine(k, y_mm, ys));
     return Eigen::RowVectorXd(
         Eigen::Map<const Eigen::RowVectorXd>(values.data(), static_cast<Eigen::Index>(values.size())));
   };
   out.columns.resize(static_cast<Eigen::Index>(samples.size()), row(0, 0).size());
   for (std::size_t i = 0; i < samples.size(); ++i)
     out.columns.row(static_cast<Eigen::Index>(i)) = row(samples[i].x_mm, samples[i].y_mm);
-  out.scale = [row, xs, ys](const Eigen::VectorXd& coefficients) {
+  out.scale = [row, xs, ys](const Eigen::VectorXd& coefficients, double level) {
     constexpr int kKnots = 13;
     proto::Function f;
     f.set_of(proto::Function::X);
@@ -152,7 +153,8 @@ Candidate of_place(const Samples& samples) {
     }
     for (int j = 0; j < kKnots; ++j)
       for (int i = 0; i < kKnots; ++i)
-        f.mutable_spline_2d()->add_value(rounded(std::exp(0.5 * row(knot(xs, i), knot(ys, j)).dot(coefficients))));
+        f.mutable_spline_2d()->add_value(
+            rounded(std::exp(0.5 * (level + row(knot(xs, i), knot(ys, j)).dot(coefficients)))));
     return f;
   };
   return out;
@@ -182,7 +184,7 @@ class VarianceFit {
     const Eigen::MatrixXd centred = columns.rowwise() - mean;
     const Eigen::VectorXd u = centred.transpose() * slope_;
     const Eigen::MatrixXd info = centred.transpose() * information_.asDiagonal() * centred;
-    // Columns of robots sum to a constant, which the nuisance parameter has taken.
+    // Each candidate's columns span a constant, which the nuisance parameter has taken.
     Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(info);
     solver.setThreshold(1e-9);
     degrees = static_cast<std::uint32_t>(solver.rank());
@@ -213,6 +215,9 @@ class VarianceFit {
     }
     return beta;
   }
+
+  /// The log scale that the samples share, given the accepted effects.
+  [[nodiscard]] double level() const { return level_; }
 
   /// By which the coefficients raise the log likelihood of one sample, over the overdispersion.
   [[nodiscard]] double gain(const Eigen::MatrixXd& columns, const Eigen::VectorXd& beta, std::size_t sample) const {
@@ -272,12 +277,12 @@ std::optional<NoiseEffect> accepted(const VarianceFit& fit, const Candidate& can
   std::tie(out.held_out, out.held_out_se) = cross_validated(fit, candidate, samples);
   if (!(out.held_out > kLeastGain && out.held_out > kLeastErrors * out.held_out_se)) return std::nullopt;
   const Eigen::VectorXd beta = fit.coefficients(candidate.columns, [](std::size_t) { return true; });
-  log_scale = candidate.columns * beta;
+  log_scale = (candidate.columns * beta).array() + fit.level();
   out.least = std::exp(0.5 * log_scale.minCoeff());
   out.most = std::exp(0.5 * log_scale.maxCoeff());
   if (!(out.most > kLeastRatio * out.least)) return std::nullopt;
   for (std::size_t i = 0; i < samples.size(); ++i) out.gain += fit.gain(candidate.columns, beta, i);
-  out.scale = candidate.scale(beta);
+  out.scale = candidate.scale(beta, fit.level());
   return out;
 }
 

@@ -20,9 +20,10 @@ namespace kilotwin::importers {
 namespace {
 
 constexpr std::string_view kMagic = "ARROW1";
-constexpr std::uint8_t kInt = 2, kFloatingPoint = 3, kUtf8 = 5;  // Type
-constexpr std::uint8_t kRecordBatch = 3;                         // MessageHeader
-constexpr std::int16_t kSingle = 1, kDouble = 2;                 // Precision
+constexpr std::uint8_t kNull = 1, kInt = 2, kFloatingPoint = 3, kBinary = 4, kUtf8 = 5, kLargeBinary = 19,
+                       kLargeUtf8 = 20;           // Type
+constexpr std::uint8_t kRecordBatch = 3;          // MessageHeader
+constexpr std::int16_t kSingle = 1, kDouble = 2;  // Precision
 
 /// Structs of the format, which stand in vectors without a table around.
 struct FieldNode {
@@ -44,7 +45,7 @@ using flatbuffers::Verifier;
 template <class T> using Vector = flatbuffers::Vector<T>;
 template <class T> using Tables = Vector<flatbuffers::Offset<T>>;
 
-/// What all tables share: each checks the fields that it reads. Offsets of other fields are never followed.
+/// Common to all tables: each checks the fields that it reads. Offsets of other fields are never followed.
 struct Checked : private flatbuffers::Table {
   using flatbuffers::Table::GetField;
   using flatbuffers::Table::GetPointer;
@@ -219,18 +220,22 @@ class ArrowReader {
     };
     const auto rows = static_cast<std::size_t>(batch.length());
     for (const Field* field : *fields_) {
+      const bool is_encoded = field->has_dictionary();
+      if (field->kind() == kNull && !is_encoded) continue;  // the only kind without buffers
       const std::string_view valid = next();
       if (!valid.empty() && valid.size() * 8 < rows) damaged();
       const auto is_there = [&](std::size_t row) {
         return valid.empty() || (static_cast<unsigned char>(valid[row / 8]) >> row % 8 & 1) != 0;
       };
-      const bool is_text = field->kind() == kUtf8 && !field->has_dictionary();
+      const bool is_text = field->kind() == kUtf8 && !is_encoded;
+      const bool is_other_text =
+          !is_encoded && (field->kind() == kBinary || field->kind() == kLargeBinary || field->kind() == kLargeUtf8);
       const std::string_view first = next();
-      const std::string_view second = is_text ? next() : std::string_view();
+      const std::string_view second = is_text || is_other_text ? next() : std::string_view();
       if (field->name() == nullptr) continue;
       if (is_text)
         add_texts(out_.columns[field->name()->str()], first, second, rows, is_there);
-      else
+      else if (!is_other_text)
         add_numbers(*field, first, rows, is_there);
     }
     out_.rows += rows;

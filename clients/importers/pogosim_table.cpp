@@ -172,11 +172,18 @@ class TableImport {
   void place_arena() {
     double most_x = 0, most_y = 0;
     for (const Row& row : table_.rows) {
+      if (row.x_mm < 0 || row.y_mm < 0)
+        throw UserError(fmt::format(
+            "{}: has a robot at {:g}, {:g} mm; the origin of pogosim's tables is a corner of the arena, "
+            "so move the origin until no coordinate is negative",
+            name_, row.x_mm, row.y_mm));
       most_x = std::max(most_x, row.x_mm);
       most_y = std::max(most_y, row.y_mm);
     }
-    width_mm_ = table_.width_mm.value_or(std::ceil(most_x + kFromWall_mm));
-    height_mm_ = table_.height_mm.value_or(std::ceil(most_y + kFromWall_mm));
+    // At least a body wide, so that a robot has a place.
+    constexpr double kLeast_mm = 2 * kFromWall_mm + 1;
+    width_mm_ = std::max(table_.width_mm.value_or(std::ceil(most_x + kFromWall_mm)), kLeast_mm);
+    height_mm_ = std::max(table_.height_mm.value_or(std::ceil(most_y + kFromWall_mm)), kLeast_mm);
   }
   [[nodiscard]] double x_mm(const Row& row) const { return row.x_mm - width_mm_ / 2; }
   [[nodiscard]] double y_mm(const Row& row) const { return row.y_mm - height_mm_ / 2; }

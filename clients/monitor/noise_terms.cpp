@@ -10,8 +10,17 @@ namespace kilotwin::monitor {
 namespace {
 
 constexpr double kSlow_s = 5;
-/// Range of the covariates over which the factors of a noise are bounded.
-constexpr Range kUsual{0, 60};
+/// Range of a covariate over which the factors of a noise are bounded: of time, place and robot that of the run, else a usual one.
+Range range_of(Covariate covariate, const RunPlan& plan) {
+  const double x_mm = plan.world.arena.stated_width_mm() / 2, y_mm = plan.world.arena.stated_height_mm() / 2;
+  switch (covariate) {
+    case Covariate::kTime: return {0, plan.duration_s};
+    case Covariate::kX: return {-x_mm, x_mm};
+    case Covariate::kY: return {-y_mm, y_mm};
+    case Covariate::kRobot: return {0, static_cast<double>(plan.robots())};
+    default: return {0, 60};
+  }
+}
 
 bool is_random(const proto::Effect& effect) {
   return std::any_of(effect.function().begin(), effect.function().end(), [](const proto::Function& function) {
@@ -24,7 +33,7 @@ struct Amplitude {
   double variance = 0;
 };
 
-Amplitude amplitude_of(const EffectSettings& effect) {
+Amplitude amplitude_of(const EffectSettings& effect, const RunPlan& plan) {
   Amplitude found;
   double factor = 1;
   for (const FunctionSettings& function : effect.functions) {
@@ -32,7 +41,7 @@ Amplitude amplitude_of(const EffectSettings& effect) {
     if (function.noise() != nullptr)
       found.noise = function.noise();
     else
-      factor *= EffectFunction(function).largest(kUsual, kUsual);
+      factor *= EffectFunction(function).largest(range_of(function.of, plan), range_of(function.and_of, plan));
   }
   if (found.noise != nullptr) found.variance = found.noise->sd * found.noise->sd * factor * factor;
   return found;
@@ -43,7 +52,7 @@ Amplitude amplitude_of(const EffectSettings& effect) {
 std::vector<NoiseTerm> noise_terms(const RunPlan& plan) {
   std::vector<NoiseTerm> terms;
   for (const EffectSettings& effect : plan.effects()) {
-    const Amplitude amplitude = amplitude_of(effect);
+    const Amplitude amplitude = amplitude_of(effect, plan);
     if (amplitude.noise == nullptr || amplitude.noise->correlation_s > kSlow_s || effect.is_measured()) continue;
     NoiseTerm term{effect.target, true, true, 0, amplitude.variance, effect.robots};
     term.left = effect.wheel != EffectSettings::Wheel::kRightWheel;
@@ -61,7 +70,7 @@ BiasNoise bias_noise(const RunPlan& plan) {
   const MotionSettings& motion = plan.motion_settings();
   BiasNoise sum;
   for (const EffectSettings& effect : plan.effects()) {
-    const Amplitude amplitude = amplitude_of(effect);
+    const Amplitude amplitude = amplitude_of(effect, plan);
     if (amplitude.noise == nullptr || amplitude.noise->correlation_s <= kSlow_s || effect.is_measured()) continue;
     double scale = 1;  // of a wheel's speed over the target
     if (effect.target == EffectSettings::Target::kTurnRate) scale = motion.wheel_base_mm / 2;

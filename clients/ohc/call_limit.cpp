@@ -7,6 +7,7 @@
 #include <csignal>
 #include <string>
 
+#include "core/base/say.hpp"
 #include "core/os/files.hpp"
 
 namespace kilotwin::ohc {
@@ -22,10 +23,10 @@ timespec time_of(std::chrono::milliseconds time) {
 void say_once(const std::string& reason) {
   static std::atomic_flag said;
   if (said.test_and_set()) return;
-  fmt::print(stderr,
-             "kilotwin: no timer for the serial port ({}): if the adapter gets stuck, this program waits for it "
-             "without an end\n",
-             reason);
+  warn(
+      fmt::format("kilotwin: no timer for the serial port ({}); if the adapter hangs, unplug it, or raise the "
+                  "limit of pending signals (ulimit -i)",
+                  reason));
 }
 
 }  // namespace

@@ -18,18 +18,12 @@ void DisplacementObserver::add(std::span<const double> x_mm, std::span<const dou
   max_distance_mm_ = 0;
   for (std::size_t i = 0; i < x_mm.size(); ++i) {
     if (i < left_out_.size() && left_out_[i] != 0) continue;
-    if (i < left_out_.size() && left_out_[i] != 0) continue;
     const double dx = x_mm[i] - start_x_mm_[i], dy = y_mm[i] - start_y_mm_[i];
     const double distance = std::sqrt(dx * dx + dy * dy);
     distances.add(distance);
     max_distance_mm_ = std::max(max_distance_mm_, distance);
   }
   mean_distance_mm_ = distances.mean();
-}
-
-void DisplacementObserver::leave_out(std::size_t robot) {
-  if (left_out_.size() <= robot) left_out_.resize(robot + 1, 0);
-  left_out_[robot] = 1;
 }
 
 void DisplacementObserver::leave_out(std::size_t robot) {

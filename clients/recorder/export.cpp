@@ -186,6 +186,13 @@ std::uint64_t export_pogosim(Reader& recording, const std::filesystem::path& fil
       {"robot_id", "", CellType::kInteger},     {"x", "mm", CellType::kNumber, 4},
       {"y", "mm", CellType::kNumber, 4},        {"angle", "rad", CellType::kNumber, 6},
       {"pogobot_ticks", "", CellType::kInteger}};
+  for (const proto::VariableColumn& variable : header.variable()) {
+    if (std::any_of(columns.begin(), columns.end(), [&](const Column& own) { return own.name == variable.name(); }))
+      throw UserError(
+          fmt::format("--pogosim: the recorded variable {} has the name of a column of pogosim's tables; rename "
+                      "it in the program, or take --variables",
+                      variable.name()));
+  }
   TableMetadata about = metadata;
   about.emplace_back("arena_width_mm", fmt::format("{}", header.arena_width_mm()));
   about.emplace_back("arena_height_mm", fmt::format("{}", header.arena_height_mm()));

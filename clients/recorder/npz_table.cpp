@@ -199,7 +199,8 @@ void NpzTable::spill() {
     if (!waiting.spilled) waiting.spilled.reset(std::tmpfile());
     if (!waiting.spilled) throw RunError(fmt::format("a temporary file cannot be made: {}", os::system_reason()));
     const std::string& blocks = waiting.blocks;
-    if (std::fwrite(blocks.data(), 1, blocks.size(), waiting.spilled.get()) != blocks.size())
+    if (std::fwrite(blocks.data(), 1, blocks.size(), waiting.spilled.get()) != blocks.size() ||
+        std::fflush(waiting.spilled.get()) != 0)
       throw RunError(fmt::format("a temporary file cannot be written: {}", os::system_reason()));
     waiting.blocks.clear();
   }

@@ -288,6 +288,8 @@ std::string Session::missing_at_start() const {
     for (const FederateId id : input->gate().unheard()) silent.push_back(id);
   }
   if (!silent.empty()) return "the frames of " + names(silent) + " to come through";
+  if (directive_writer_ && directive_writer_->readers() + 1 < plan_.federates())
+    return "all services to receive directives";
   return deaf.empty() ? "" : names(deaf) + " to hear all others";
 }
 

@@ -4,6 +4,7 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <exception>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -97,13 +98,19 @@ void RobotLogs::flush() {
   waiting_ = 0;  // if a write fails, its text is lost: a retry would fail each second of a full disk
   std::error_code error;
   fs::create_directories(folder_, error);
+  std::exception_ptr first;  // robots whose files can be written keep their lines
   for (auto& [robot, log] : logs_) {
     if (log.text.empty()) continue;
     const std::string text = std::exchange(log.text, {});
-    os::OutputFile file(file_of(robot), os::OutputFile::Existing::kAppend);
-    file.buffer() = text;
-    file.close();
+    try {
+      os::OutputFile file(file_of(robot), os::OutputFile::Existing::kAppend);
+      file.buffer() = text;
+      file.close();
+    } catch (const RunError&) {
+      if (!first) first = std::current_exception();
+    }
   }
+  if (first) std::rethrow_exception(first);
 }
 
 }  // namespace kilotwin

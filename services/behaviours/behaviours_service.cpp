@@ -76,8 +76,8 @@ class BehavioursFederate : public Federate {
     metrics.robots_failed = engine_.robots_failed();
     lend_observations(observed_, octets_, metrics);
     if (!last) return;
-    logs_.flush();
     write_eeproms(engine_, session_.plan().share(host_), context_.run_directory);
+    logs_.flush();
   }
 
  private:

@@ -80,7 +80,23 @@ TEST(NoiseEffects, ARoughPatchIsAnEffectOfPlace) {
   const std::vector<NoiseEffect> found = find_noise_effects(f.samples);
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].covariates, std::vector<std::string>{"position"});
-  EXPECT_TRUE(found[0].scale.has_spline_2d());
+  ASSERT_TRUE(found[0].scale.has_spline_2d());
+  // The patch covers a small part of the floor. There the noise is larger than the common one, and elsewhere about as the fit without
+  // an effect says, or less.
+  const proto::Spline2d& map = found[0].scale.spline_2d();
+  double far = 0, near = 0;
+  int places = 0;
+  for (int j = 0; j < map.and_knot_size(); ++j) {
+    for (int i = 0; i < map.knot_size(); ++i) {
+      const double x_mm = map.knot(i), y_mm = map.and_knot(j), value = map.value(j * map.knot_size() + i);
+      const double away_mm = std::hypot(x_mm - 180, y_mm + 120);
+      if (away_mm < 60) near = std::max(near, value);
+      if (away_mm > 400) far += value, ++places;
+    }
+  }
+  ASSERT_GT(places, 5);
+  EXPECT_GT(near, 1.5);
+  EXPECT_LT(far / places, 1.15);
 }
 
 TEST(NoiseEffects, EqualNoiseHasNone) {
@@ -90,7 +106,9 @@ TEST(NoiseEffects, EqualNoiseHasNone) {
     const Fitter fitter(set, 2);
     FitState state(set);
     fitter.fit_base(state);
-    for (const NoiseEffect& effect : find_noise_effects(noise_samples_of(state, 2)))
+    const std::vector<NoiseSample> samples = noise_samples_of(state, 2);
+    ASSERT_GT(samples.size(), 400U) << "fewer are not searched";
+    for (const NoiseEffect& effect : find_noise_effects(samples))
       ADD_FAILURE() << effect.name << ", log10 p " << effect.log10_p << ", gain " << effect.held_out;
   }
 }

@@ -189,7 +189,7 @@ std::string unit_of_key(std::string_view key) {
   return "";
 }
 
-/// What stands behind a key of result.json.
+/// The value of a key of result.json.
 std::string value_of_key(const FieldDescriptor& field) {
   if (field.is_map()) {
     const FieldDescriptor& value = *field.message_type()->map_value();

@@ -294,10 +294,10 @@ class Deployments : public testing::Test {
     for (pace_ = 1; pace_ >= kSlowest && !judged_ && !HasFatalFailure(); pace_ /= 2) attempt();
     EXPECT_TRUE(judged_);
   }
-  /// A robot that gets lost tells of a busy machine, or of a bad tracker: the slowest attempt decides.
+  /// Robots that get lost, or are off, are signs of a busy machine or of a bad tracker: the slowest attempt decides.
   void judge(const Comparison& result) {
     fmt::print("pace {}: absent {} times\n", pace_, result.absent);
-    if (result.absent > 0 && pace_ > kSlowest) return;
+    if (!is_as_asked(result) && pace_ > kSlowest) return;
     judged_ = true;
     expect_as_asked(result);
   }
@@ -336,6 +336,15 @@ class Deployments : public testing::Test {
   /// One attempt of each deployment.
   void play_c();
   void play_d();
+  /// Whether expect_as_asked() would pass, with no robot lost at any time.
+  static bool is_as_asked(const Comparison& result) {
+    Errors overall = result.free_deg;
+    overall.add(result.touching_deg);
+    return result.absent == 0 && result.position_mm.count > 1000 && result.straight_deg.count > 100 &&
+           result.position_mm.rms() < 1 && result.straight_deg.rms() < 5 && result.free_deg.rms() < 10 &&
+           overall.rms() < 10 &&
+           static_cast<double>(result.steady_right) > 0.99 * static_cast<double>(result.steady_leds);
+  }
   static void expect_as_asked(const Comparison& result) {
     const auto percent = [](long right, long of) {
       return 100 * static_cast<double>(right) / static_cast<double>(std::max(1L, of));
@@ -410,7 +419,10 @@ void Deployments::play_c() {
   const auto run = start_run(
       "foraging.txtpb", here_, "run",
       {"--set", "robots.body=TRACKED", "--set", "robots.says.shadow=true", "--set", "tracking.start=WHEN_SEEN"});
-  ASSERT_TRUE(tracker->says(fmt::format("identification: {0} of {0} robots have their numbers", kRobots), 120));
+  if (!tracker->says(fmt::format("identification: {0} of {0} robots have their numbers", kRobots), 120)) {
+    EXPECT_GT(pace_, kSlowest) << "the robots were not identified";
+    return;
+  }
   const double from_s = of_run.time_s() + 3;
   constexpr double kLasts_s = 20;
   ASSERT_TRUE(eventually([&] { return of_run.time_s() > from_s + kLasts_s; }, 200));
@@ -419,8 +431,8 @@ void Deployments::play_c() {
   world_run->wait(60);
   const World world(of_world.moments());
   constexpr std::uint8_t kRed = 3;
-  EXPECT_TRUE(world.any_led(kRed)) << "a robot took a load, as the station told it";
   judge(compare(world, of_run.moments(), samples, 0, {0, 1, 2, 3, 4}, from_s));
+  if (judged_) EXPECT_TRUE(world.any_led(kRed)) << "a robot takes a load when the station says so";
 }
 
 /// Robots of the real world that walk at random, with LEDs that tell nothing of their motion.

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "core/dds/dds.hpp"
+#include "tests/system/own_domain.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::test {
@@ -73,10 +74,10 @@ TEST(Printing, TextThatWaitsAtTheEndIsWrittenOrFailsTheRun) {
     const Outcome prepared = kilotwin({"run", scratch / (kind + ".txtpb"), "--prepare", "--out", run}, scratch);
     ASSERT_EQ(prepared.status, 0) << prepared.err;
     write(run + "/logs", "a file in place of the folder");
-    const std::string domain = std::to_string(dds::DomainClaim::any().domain());
+    const OwnDomain domain;
     const auto service = [&](const std::string& name, Words more) {
       fs::create_directories(scratch.path() / (kind + name));
-      Words words{program(), "service", name, "--run", run, "--domain", domain};
+      Words words{program(), "service", name, "--run", run, "--domain", domain.name};
       words.insert(words.end(), more.begin(), more.end());
       return std::make_unique<Process>(words, scratch.path() / (kind + name));
     };

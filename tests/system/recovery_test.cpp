@@ -238,6 +238,7 @@ TEST_F(Recoveries, AKilledWorkerFailsNoRobot) {
     };
     ASSERT_TRUE(eventually([&] { return worker() > 0 && std::filesystem::exists(run + "/recording.ktrec"); }));
     const pid_t id = worker();
+    ASSERT_GT(id, 0) << "the worker has ended";
     for (const int signal : signals) kill(id, signal);
     const Outcome outcome = process.wait(60);
     EXPECT_EQ(outcome.status, 1);

@@ -67,8 +67,8 @@ identify::Identified identify_floor_data(const fs::path& train, const fs::path& 
   std::vector<kilogrid::FloorRun> held_out;
   if (!test.empty()) held_out = kilogrid::read_floor_runs(test);
   // Beside the days that are reported.
-  const fs::path ledger = (test.empty() ? train : test) / kilogrid::OpenedDays::kFile;
-  return kilogrid::identify_floor(kilogrid::read_floor_runs(train), std::move(held_out), options, ledger);
+  const fs::path opened_days = (test.empty() ? train : test) / kilogrid::OpenedDays::kFile;
+  return kilogrid::identify_floor(kilogrid::read_floor_runs(train), std::move(held_out), options, opened_days);
 }
 
 identify::Identified identify_bristle_data(const fs::path& train, const fs::path& test, const fs::path&,

@@ -1,6 +1,7 @@
 #include "clients/identify/fit/noise_samples.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -26,7 +27,7 @@ class ProcessRecorder {
     moved.block<2, 1>(0, 2) = by.by_heading;
     process_ = (moved * process_ * moved.transpose()).eval();
     const Noise& noise = model_.noise;
-    const Eigen::Vector2d speeds(record.rates.left_mm_s, record.rates.right_mm_s);
+    const Eigen::Vector2d speeds = record.rates.driven_mm_s();
     const Eigen::Vector2d paths_mm2 =
         record.h_s * (noise.factor_s * speeds.cwiseAbs2() + Eigen::Vector2d::Constant(noise.wheel_mm2_s));
     process_ += by.by_wheel * paths_mm2.asDiagonal() * by.by_wheel.transpose();

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <utility>
@@ -26,10 +27,11 @@ std::uint64_t hash_of(const FloorRun& run) {
   return hash.finish();
 }
 
-/// Of all that a search depends on: the program and the training days.
-std::uint64_t hash_of_search(const std::vector<FloorRun>& train) {
+/// Of all that a search depends on: the program, its options, and the days.
+std::uint64_t hash_of_search(const std::vector<const FloorRun*>& searched, const std::string& options) {
   HashState hash(hash_bytes(build_identity()));
-  for (const FloorRun& run : train) hash.add(hash_of(run));
+  hash.add(hash_bytes(options));
+  for (const FloorRun* const run : searched) hash.add(hash_of(*run));
   return hash.finish();
 }
 
@@ -57,6 +59,13 @@ FloorDays divided(std::vector<FloorRun> train, std::vector<FloorRun> test) {
   return days;
 }
 
+std::vector<const FloorRun*> FloorDays::searched() const {
+  std::vector<const FloorRun*> days;
+  for (const std::vector<FloorRun>* part : {&fit, &choose})
+    for (const FloorRun& run : *part) days.push_back(&run);
+  return days;
+}
+
 std::size_t chosen_model(const std::vector<FloorScore>& path) {
   constexpr double kSameMisfit = 0.02, kSameError = 0.01;
   const auto eligible = [&](std::size_t k) {
@@ -71,13 +80,22 @@ std::size_t chosen_model(const std::vector<FloorScore>& path) {
   return 0;
 }
 
-OpenedDays::Opened OpenedDays::open(const std::vector<FloorRun>& report, const std::vector<FloorRun>& train,
+OpenedDays::Opened OpenedDays::open(const std::vector<FloorRun>& report,
+                                    const std::vector<const FloorRun*>& searched, const std::string& options,
                                     const std::string& today) const {
   if (file_.empty()) return {};
   std::set<std::string> days, searches;
   for (const FloorRun& run : report) days.insert(hex(hash_of(run)));
-  const std::string search = hex(hash_of_search(train));
-  const std::string known = os::read_if_there(file_).value_or("");
+  const std::string search = hex(hash_of_search(searched, options));
+  Opened opened;
+  std::error_code error;
+  const std::optional<std::string> read = os::read_if_there(file_);
+  if (!read && std::filesystem::exists(file_, error)) {
+    opened.unwritable = file_.string() + " cannot be read";
+    return opened;
+  }
+  std::string known = read.value_or("");
+  if (!known.empty() && known.back() != '\n') known += '\n';
   std::istringstream lines(known);
   for (std::string line; std::getline(lines, line);) {
     std::istringstream words(line);
@@ -85,7 +103,6 @@ OpenedDays::Opened OpenedDays::open(const std::vector<FloorRun>& report, const s
     if (line.starts_with('#') || !(words >> date >> day >> by)) continue;
     if (days.contains(day)) searches.insert(by);
   }
-  Opened opened;
   opened.before = searches.size() - searches.count(search);
   if (searches.contains(search)) return opened;
   std::string text =

@@ -16,6 +16,9 @@ struct FloorDays {
   std::vector<FloorRun> choose;    ///< choose among the models of the search
   std::vector<FloorRun> report;    ///< give the error
   bool chose_on_reported = false;  ///< too few days: those that choose are those that report
+
+  /// The days of the fit, then those that choose; valid as long as this object.
+  [[nodiscard]] std::vector<const FloorRun*> searched() const;
 };
 
 /// Divides days. `test` not empty: all of it reports, and every fourth day of `train` chooses if there are three or more. `test`
@@ -37,7 +40,7 @@ struct FloorScore {
 class OpenedDays {
  public:
   /// The file's name in the directory of the data.
-  static constexpr const char* kFile = "opened-days.ledger";
+  static constexpr const char* kFile = "opened-days.txt";
   /// An empty path: no record.
   explicit OpenedDays(std::filesystem::path file) : file_(std::move(file)) {}
 
@@ -45,10 +48,11 @@ class OpenedDays {
     std::size_t before = 0;  ///< other searches that were reported on any of the days
     std::string unwritable;  ///< why the record could not be written; empty: it was
   };
-  /// Notes that a search is reported on these days. A search with the same training days and the same program counts once,
-  /// because it gives the same result. `today`: a date for readers of the file.
-  [[nodiscard]] Opened open(const std::vector<FloorRun>& report, const std::vector<FloorRun>& train,
-                            const std::string& today) const;
+  /// Notes that a search is reported on these days. `searched`: all days that fit or choose. A search with the same days, options
+  /// and program counts once, because it gives the same result. `options`: them, in any words. `today`: a date for readers of the
+  /// file.
+  [[nodiscard]] Opened open(const std::vector<FloorRun>& report, const std::vector<const FloorRun*>& searched,
+                            const std::string& options, const std::string& today) const;
 
  private:
   std::filesystem::path file_;

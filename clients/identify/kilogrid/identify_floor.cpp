@@ -413,7 +413,10 @@ void FloorIdentification::add_caveats(const OpenedDays::Opened& opened) {
         "new days can confirm this model.",
         opened.before, opened.before == 1 ? " was" : "es were", OpenedDays::kFile));
   if (!opened.unwritable.empty())
-    sentences.push_back(fmt::format("That these days were reported could not be noted: {}.", opened.unwritable));
+    sentences.push_back(
+        fmt::format("The report on these days could not be recorded: {}. Make it possible to write there, then "
+                    "repeat the command.",
+                    opened.unwritable));
   if (effects_of(model_) > 0 && !(after_.misfit <= before_.misfit))
     sentences.push_back(
         fmt::format("On the reported days the misfit is larger with effects than without ({:.0f}, {:.0f}): they "
@@ -436,10 +439,12 @@ std::string today() {
   return fmt::format("{:%Y-%m-%d}", std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now()));
 }
 
-void FloorIdentification::judge(const OpenedDays& ledger) {
+void FloorIdentification::judge(const OpenedDays& record) {
   part_ = 0.85;
   say("predictions");
-  const OpenedDays::Opened opened = ledger.open(days_.report, days_.fit, today());
+  const OpenedDays::Opened opened =
+      record.open(days_.report, days_.searched(),
+                  fmt::format("horizon {} s, effects {}", options_.horizon_s, options_.find_effects), today());
   before_ = judged(base_, 78, by_base_);
   after_ = judged(model_, 79, by_model_);
   for (const auto& [to, of] : {std::pair{out().mutable_before(), &before_}, {out().mutable_after(), &after_}}) {
@@ -529,12 +534,12 @@ Identified FloorIdentification::result() {
 }  // namespace
 
 Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> test, const Options& options,
-                          const std::filesystem::path& ledger) {
+                          const std::filesystem::path& opened_days) {
   FloorIdentification identification(divided(std::move(train), std::move(test)), options);
   identification.fit_base();
   if (options.find_effects) identification.search();
   identification.choose();
-  identification.judge(OpenedDays(ledger));
+  identification.judge(OpenedDays(opened_days));
   identification.compare_with_days();
   return identification.result();
 }

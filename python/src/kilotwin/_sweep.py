@@ -81,6 +81,8 @@ def sweep(
             words += [option, str(value)]
     if strict:
         words.append("--strict")
+    if isinstance(slurm, str):
+        slurm = [slurm]
     if slurm or isinstance(slurm, Sequence):
         words.append("--slurm")
     if isinstance(slurm, Sequence):

@@ -34,7 +34,7 @@ class FastCore {
   /// A page of the flash has been erased or written.
   void forget(std::uint32_t address, std::uint32_t octets);
 
-  /// What the state in `avr` lacks: mark() saves it, and rewind() restores it.
+  /// The part of the state that `avr` lacks: mark() saves it, and rewind() restores it.
   void mark() { marked_ = waiting_; }
   void rewind();
 

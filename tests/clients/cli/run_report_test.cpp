@@ -30,7 +30,7 @@ TEST(RunReport, SaysWhatIsDrawnOfALongRecordingAndWhoHeldUpWhom) {
   EXPECT_EQ(all.find("one state in"), std::string::npos);
   EXPECT_NE(all, some);
 
-  // Who held up whom: the federate that waited least, unless all waited most of their time.
+  // The federate that waited least held up the others, unless all waited most of their time.
   recorder::Summary summary = recorder::read_summary(directory.summary());
   summary.federates = {{"physics 1,1", 1, 0, 9}, {"radio", 8, 1, 1}};
   recorder::write_summary(summary, directory.summary());

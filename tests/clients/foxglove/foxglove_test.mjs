@@ -145,7 +145,7 @@ try {
   deaf.on("error", () => {});
   deaf.send(JSON.stringify({ op: "subscribe", subscriptions: [...Array(100).keys()].map((id) => ({ id, channelId: id })) }));
   deaf.pause();
-  const seenBefore = late.messages["/robots"].length;
+  const seenBefore = late.messages["/robots"].length; // its own bound is that of the newest message of each channel
   await late.until("states beside a viewer that never reads", () => late.messages["/robots"].length >= seenBefore + 10);
   deaf.terminate();
 

@@ -408,7 +408,7 @@ TEST(PogosimTable, OtherAndDamagedFilesAreRefused) {
   std::ifstream in(file, std::ios::binary);
   const std::string whole((std::istreambuf_iterator<char>(in)), {});
   EXPECT_EQ(error("whole.feather", whole), "");
-  // Whatever octet is another, the file is read or refused.
+  // Any octet may be another one: the file is read or refused.
   int refused = 0;
   for (std::size_t i = 0; i < whole.size(); ++i) {
     std::string changed = whole;

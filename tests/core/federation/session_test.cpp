@@ -328,7 +328,7 @@ TEST_F(Sessions, TakeDirectivesThatAFederateWasTooLateToHear) {
     for (std::uint8_t octet = 1; octet <= 3; ++octet) director->announce(DirectiveKind::kOverheadInput, 0, octet);
   };
   for (std::uint32_t i = 0; i < host_.value(); ++i) start(FederateId{i});
-  for (int i = 0; i < 500 && !waits; ++i) std::this_thread::sleep_for(10ms);
+  for (int i = 0; i < 3000 && !waits; ++i) std::this_thread::sleep_for(10ms);
   EXPECT_TRUE(waits);
   start(host_);
   join();
@@ -447,7 +447,7 @@ TEST_F(Sessions, PrintTheFederatesThatTheyWaitFor) {
     if (session.waiting_for().find("behaviours 1/1 to arrive") != std::string::npos) said = true;
   };
   for (std::uint32_t i = 0; i < host_.value(); ++i) start(FederateId{i});
-  for (int i = 0; i < 500 && !said; ++i) std::this_thread::sleep_for(10ms);
+  for (int i = 0; i < 3000 && !said; ++i) std::this_thread::sleep_for(10ms);
   EXPECT_TRUE(said);
   start(host_);
   join();

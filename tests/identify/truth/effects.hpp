@@ -68,7 +68,7 @@ Effect mosaic(double strength = 1);                 // cameras with mosaic seams
 
 // Of several covariates.
 Effect failures_in_turn(double strength = 1);    // robots become slow one after another
-Effect veering_robots(double strength = 1);      // every third robot veers from some time on
+Effect veering_robots(double strength = 1);      // every third robot turns to one side from some time on
 Effect late_patch_of_some(double strength = 1);  // some robots are slow, from some time on, in half of the arena
 Effect boards(double strength = 1);              // boards that lie diagonally, finer than the maps resolve
 

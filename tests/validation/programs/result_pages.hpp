@@ -14,7 +14,7 @@ namespace kilotwin::validation {
 /// Seeds of a program with a measure that differs by more than 10 % with one seed; of one that the test then tells apart.
 inline constexpr int kMoreSeeds = static_cast<int>(kLeastRuns), kMostSeeds = 3 * kMoreSeeds;
 
-/// What was found out about programs that differ or do not run: a table with the columns `program` and `cause`.
+/// Causes for which programs differ or do not run: a table with the columns `program` and `cause`.
 class Causes {
  public:
   /// Throws UserError if the file is no such table.

@@ -76,30 +76,61 @@ TEST(FloorProtocol, AModelThatPredictsWorseThanTheBaseIsNotChosen) {
   EXPECT_EQ(chosen_model({{100, 80}, {60, 79}, {40, 78}}), 2U);
 }
 
+/// Days of a search, as open() takes them.
+struct Days {
+  explicit Days(std::vector<FloorRun> runs) : runs_(std::move(runs)) {}
+  operator std::vector<const FloorRun*>() const {  // NOLINT: an argument
+    std::vector<const FloorRun*> all;
+    for (const FloorRun& run : runs_) all.push_back(&run);
+    return all;
+  }
+
+ private:
+  std::vector<FloorRun> runs_;
+};
+
 TEST(OpenedDays, CountsOtherSearchesOfTheSameDays) {
   const Scratch scratch;
   const OpenedDays ledger(scratch.path);
   const std::vector<FloorRun> report = days(5, 7);
-  EXPECT_EQ(ledger.open(report, days(0, 3), "2026-01-01").before, 0U);
-  EXPECT_EQ(ledger.open(report, days(0, 3), "2026-01-02").before, 0U) << "the same search gives the same result";
-  EXPECT_EQ(ledger.open(report, days(0, 4), "2026-01-03").before, 1U);
-  EXPECT_EQ(ledger.open(days(6, 7), days(1, 4), "2026-01-04").before, 2U) << "one of the days was open";
-  EXPECT_EQ(ledger.open(days(7, 9), days(0, 3), "2026-01-05").before, 0U) << "other days";
-  EXPECT_EQ(OpenedDays({}).open(report, days(0, 2), "2026-01-06").before, 0U);
+  EXPECT_EQ(ledger.open(report, Days(days(0, 3)), "", "2026-01-01").before, 0U);
+  EXPECT_EQ(ledger.open(report, Days(days(0, 3)), "", "2026-01-02").before, 0U)
+      << "the same search gives the same result";
+  EXPECT_EQ(ledger.open(report, Days(days(0, 4)), "", "2026-01-03").before, 1U);
+  EXPECT_EQ(ledger.open(days(6, 7), Days(days(1, 4)), "", "2026-01-04").before, 2U) << "one of the days was open";
+  EXPECT_EQ(ledger.open(days(6, 7), Days(days(1, 4)), "no effects", "2026-01-04").before, 3U) << "other options";
+  EXPECT_EQ(ledger.open(days(7, 9), Days(days(0, 3)), "", "2026-01-05").before, 0U) << "other days";
+  EXPECT_EQ(OpenedDays({}).open(report, Days(days(0, 2)), "", "2026-01-06").before, 0U);
 }
 
 TEST(OpenedDays, KeepsWhatItDoesNotUnderstand) {
   const Scratch scratch;
   std::ofstream(scratch.path) << "# a remark\nnonsense\n";
-  EXPECT_EQ(OpenedDays(scratch.path).open(days(5, 6), days(0, 3), "2026-01-01").before, 0U);
+  EXPECT_EQ(OpenedDays(scratch.path).open(days(5, 6), Days(days(0, 3)), "", "2026-01-01").before, 0U);
   std::ifstream in(scratch.path);
   const std::string text{std::istreambuf_iterator<char>(in), {}};
   EXPECT_TRUE(text.starts_with("# a remark\nnonsense\n2026-01-01 ")) << text;
 }
 
+TEST(OpenedDays, KeepsALastLineWithoutAnEnd) {
+  const Scratch scratch;
+  std::ofstream(scratch.path) << "# a remark";
+  const OpenedDays record(scratch.path);
+  EXPECT_EQ(record.open(days(5, 6), Days(days(0, 3)), "", "2026-01-01").before, 0U);
+  EXPECT_EQ(record.open(days(5, 6), Days(days(0, 4)), "", "2026-01-02").before, 1U);
+}
+
+TEST(OpenedDays, NeverReplacesAFileThatItCannotRead) {
+  const Scratch scratch;
+  std::filesystem::create_directory(scratch.path);
+  const OpenedDays::Opened opened = OpenedDays(scratch.path).open(days(5, 6), Days(days(0, 3)), "", "2026-01-01");
+  EXPECT_NE(opened.unwritable.find("cannot be read"), std::string::npos) << opened.unwritable;
+  EXPECT_TRUE(std::filesystem::is_directory(scratch.path));
+}
+
 TEST(OpenedDays, SayWhyTheyCannotBeNoted) {
   const OpenedDays::Opened opened =
-      OpenedDays("/nonexistent/opened-days.ledger").open(days(5, 6), days(0, 3), "2026-01-01");
+      OpenedDays("/nonexistent/opened-days.txt").open(days(5, 6), Days(days(0, 3)), "", "2026-01-01");
   EXPECT_NE(opened.unwritable.find("/nonexistent"), std::string::npos) << opened.unwritable;
 }
 
@@ -115,7 +146,7 @@ TEST(IdentifyFloor, SaysWhichDaysChoseAndThatDaysWereOpenedBefore) {
   };
   identify::Options options;
   options.find_effects = false;
-  static_cast<void>(OpenedDays(scratch.path).open(played(4, 5), days(0, 2), "2026-01-01"));
+  static_cast<void>(OpenedDays(scratch.path).open(played(4, 5), Days(days(0, 2)), "", "2026-01-01"));
   const identify::Identified found = identify_floor(played(1, 4), played(4, 5), options, scratch.path);
   const identification::Result& result = found.found.result();
   EXPECT_EQ(result.held_out().in_words(), "Days that give the errors: day-4. Days that chose the model: day-3.");
