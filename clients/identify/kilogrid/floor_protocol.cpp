@@ -88,9 +88,9 @@ OpenedDays::Opened OpenedDays::open(const std::vector<FloorRun>& report,
   for (const FloorRun& run : report) days.insert(hex(hash_of(run)));
   const std::string search = hex(hash_of_search(searched, options));
   Opened opened;
-  std::error_code error;
+  std::error_code ignored;
   const std::optional<std::string> read = os::read_if_there(file_);
-  if (!read && std::filesystem::exists(file_, error)) {
+  if (!read && std::filesystem::exists(file_, ignored)) {
     opened.unwritable = file_.string() + " cannot be read";
     return opened;
   }
