@@ -371,7 +371,7 @@ class Package(unittest.TestCase):
         # So long, no thread is made to give way: the other one counts only while a call lets go of the interpreter.
         interval = sys.getswitchinterval()
         counter = threading.Thread(target=count)
-        with kilotwin.Arena(EXPERIMENT, robots=4, duration_s=3.6e6) as arena:
+        with kilotwin.Arena(EXPERIMENT, robots=4, duration_s=1e6) as arena:
             counter.start()
             counting.wait()
             sys.setswitchinterval(1000)
