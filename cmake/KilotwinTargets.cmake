@@ -2,7 +2,7 @@
 
 set(KILOTWIN_SANITIZE "" CACHE STRING "Sanitizers to build with, as for -fsanitize=")
 option(KILOTWIN_WERROR "Treat warnings as errors" OFF)
-option(KILOTWIN_UNITY "Compile the sources of targets with many templates several to a unit" ON)
+option(KILOTWIN_UNITY "Compile the sources of a target several to a unit" ON)
 option(KILOTWIN_PCH "Precompile the headers of the standard library and of the packages" ON)
 
 add_library(kilotwin_flags INTERFACE)
@@ -60,8 +60,8 @@ function(kilotwin_precompile name)
   endif()
 endfunction()
 
-# kilotwin_unite(NAME): compiles the sources of NAME several to a unit, so that they share the templates that they instantiate.
-# Names in anonymous namespaces must then be unique among the library's files.
+# kilotwin_unite(NAME): compiles the sources of NAME several to a unit, so that they share the headers that they include and the
+# templates that they instantiate. Names in anonymous namespaces must then be unique among the sources of a target.
 function(kilotwin_unite name)
   if(KILOTWIN_UNITY)
     set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
@@ -70,29 +70,25 @@ function(kilotwin_unite name)
   endif()
 endfunction()
 
-# kilotwin_library(NAME [UNITE] SOURCES a.cpp ... DEPENDS target ...): a static library of one folder, with the include path of
+# kilotwin_library(NAME SOURCES a.cpp ... DEPENDS target ...): a static library of one folder, with the include path of
 # its headers. tests/layers defines which folder may include which.
 function(kilotwin_library name)
-  cmake_parse_arguments(arg "UNITE" "" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(arg "" "" "SOURCES;DEPENDS" ${ARGN})
   add_library(${name} STATIC ${arg_SOURCES})
   target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PUBLIC ${arg_DEPENDS} kilotwin_flags)
   kilotwin_precompile(${name} FROM ${kilotwin_precompiled_target})
-  if(arg_UNITE)
-    kilotwin_unite(${name})
-  endif()
+  kilotwin_unite(${name})
 endfunction()
 
 # kilotwin_program(NAME SOURCES a.cpp ... DEPENDS target ...): an executable that is not a test.
 function(kilotwin_program name)
-  cmake_parse_arguments(arg "UNITE" "" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(arg "" "" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PRIVATE ${arg_DEPENDS} kilotwin_flags)
   kilotwin_precompile(${name} FROM ${kilotwin_precompiled_target})
-  if(arg_UNITE)
-    kilotwin_unite(${name})
-  endif()
+  kilotwin_unite(${name})
 endfunction()
 
 # kilotwin_test(NAME SOURCES a_test.cpp ... DEPENDS target ... [TIMEOUT s] [LABELS label ...]): one GoogleTest program, each
@@ -101,7 +97,7 @@ endfunction()
 # would take most of the time. The test preset "fast" runs these, all others leave them out. SLOW_CASES names cases of a fast program
 # that are slow, as patterns of --gtest_filter. ALONE: no other test runs beside it.
 function(kilotwin_test name)
-  cmake_parse_arguments(arg "UNITE;ALONE" "TIMEOUT" "SOURCES;DEPENDS;LABELS;SLOW_CASES" ${ARGN})
+  cmake_parse_arguments(arg "ALONE" "TIMEOUT" "SOURCES;DEPENDS;LABELS;SLOW_CASES" ${ARGN})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 120)
   endif()
@@ -112,9 +108,7 @@ function(kilotwin_test name)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PRIVATE ${arg_DEPENDS} kilotwin_flags GTest::gtest GTest::gtest_main)
   kilotwin_precompile(${name} FROM kilotwin_precompiled_test)
-  if(arg_UNITE)
-    kilotwin_unite(${name})
-  endif()
+  kilotwin_unite(${name})
   list(JOIN arg_SLOW_CASES ":" slow)
   gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 TEST_FILTER "-${slow}"
     PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}" RUN_SERIAL "${arg_ALONE}")

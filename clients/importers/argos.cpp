@@ -24,7 +24,7 @@ constexpr double kAxleToCentre_mm =
 constexpr double kDefaultLight_m = 1;  ///< distance at which the laws of light are made to agree
 
 /// Why an element has no counterpart. Empty: the element needs no line.
-const std::map<std::string, std::string>& reasons() {
+const std::map<std::string, std::string>& reasons_of_elements() {
   static const std::map<std::string, std::string> all{
       {"system@threads", "give --threads with --mode local, or --partitions"},
       {"experiment@ticks_per_second", "a tick is 32.768 ms, the firmware's own"},
@@ -88,7 +88,7 @@ class ArgosImport {
     engines(child(root, "physics_engines"));
     media(child(root, "media"));
     if (experiment().robots().empty()) throw UserError(fmt::format("{}: holds no <kilobot>", name_));
-    imported_.notes = xml_.notes(reasons());
+    imported_.notes = xml_.notes(reasons_of_elements());
     return std::move(imported_);
   }
 

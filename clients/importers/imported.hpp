@@ -11,6 +11,9 @@
 
 namespace kilotwin::importers {
 
+/// Least distance of the centre of an imported robot from a wall.
+inline constexpr double kFromWall_mm = 17;
+
 /// A table of initial poses that the experiment names.
 struct PosesFile {
   std::string name;  ///< beside the experiment file

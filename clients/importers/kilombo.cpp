@@ -16,7 +16,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 /// Why a parameter has no counterpart; empty: none is reported.
-const std::map<std::string, std::string>& reasons() {
+const std::map<std::string, std::string>& reasons_of_parameters() {
   static const std::map<std::string, std::string> all{
       {"timeStep", "a tick is 32.768 ms, the firmware's own"},
       {"GUI", "kilotwin view shows a run in a browser"},
@@ -96,9 +96,9 @@ class KilomboImport {
     if (const auto steps = number("stateFileSteps"); steps && *steps > 0)
       experiment.mutable_recording()->set_every_s(*steps * number("timeStep").value_or(0.0416667));
     for (const auto& [key, value] : parameters_.items()) {
-      const auto reason = reasons().find(key);
+      const auto reason = reasons_of_parameters().find(key);
       if (read_.contains(key)) continue;
-      if (reason == reasons().end())
+      if (reason == reasons_of_parameters().end())
         imported_.notes.push_back(key + ": is a parameter of the program; give --define, or state it there");
       else if (!reason->second.empty())
         imported_.notes.push_back(key + ": " + reason->second);

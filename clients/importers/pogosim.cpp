@@ -20,7 +20,7 @@ namespace kilotwin::importers {
 namespace {
 
 /// Why a key of the top level or of an object has no counterpart; empty: none is reported.
-const std::map<std::string, std::string>& reasons() {
+const std::map<std::string, std::string>& reasons_of_keys() {
   static const std::map<std::string, std::string> all{
       {"time_step", "a tick is 32.768 ms, the firmware's own"},
       {"GUI", "kilotwin view shows a run in a browser"},
@@ -373,8 +373,8 @@ class PogosimImport {
       if (!entry.first.IsScalar()) continue;
       const auto key = entry.first.as<std::string>();
       if (read.contains(key)) continue;
-      const auto reason = reasons().find(key);
-      if (reason == reasons().end())
+      const auto reason = reasons_of_keys().find(key);
+      if (reason == reasons_of_keys().end())
         note(entry.first, key + ": has no counterpart");
       else if (!reason->second.empty() && told_.insert(key).second)
         note(entry.first, key + ": " + reason->second);

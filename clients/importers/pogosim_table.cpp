@@ -23,8 +23,6 @@
 namespace kilotwin::importers {
 namespace {
 
-/// Least distance of a robot's centre from a wall.
-constexpr double kFromWall_mm = 17;
 constexpr double kMostRobots = 1e6;
 
 struct Row {

@@ -24,9 +24,6 @@ using doors::LogRow;
 /// Pixels of ARK's stitched picture, and of the camera of LARS.
 constexpr double kArkSide_px = 2000, kLarsWidth_px = 1920, kLarsHeight_px = 1200;
 
-/// Least distance of a robot's centre from a wall.
-constexpr double kFromWall_mm = 17;
-
 /// Rows of ARK begin with a number and a tab; a log of LARS begins with a header in words.
 proto::LogDoor::Format format_of(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);

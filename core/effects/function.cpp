@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/base/pose.hpp"
+#include "core/effects/motion_change.hpp"
 #include "core/math/elementary.h"
 
 namespace kilotwin {
@@ -10,8 +11,6 @@ namespace {
 
 /// Exponents are limited to this value, so that results stay finite for any model.
 constexpr double kLargestExponent = 60;
-
-double magnitude(double v) { return v < 0 ? -v : v; }
 
 /// Sample points for largest(): the ends of the range, the knots within it, and points between the knots.
 std::vector<double> sample_points(Range range, std::span<const double> knots) {

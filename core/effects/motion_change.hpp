@@ -39,15 +39,18 @@ struct UnitOffsets {
 /// by opposite offsets of the wheels. All zero for gains and for effects on measurement.
 [[nodiscard]] constexpr UnitOffsets unit_offsets(EffectSettings::Target target, bool left, bool right, double along,
                                                  double across, double wheel_base_mm) {
-  using Target = EffectSettings::Target;
+  using enum EffectSettings::Target;
   switch (target) {
-    case Target::kWheelOffset: return {left ? 1.0 : 0.0, right ? 1.0 : 0.0};
-    case Target::kTurnRate: return {-wheel_base_mm / 2, wheel_base_mm / 2};
-    case Target::kBodyDrift: return {along, along, across};
-    case Target::kWorldDrift: return {0, 0, 0, along, across};
+    case kWheelOffset: return {left ? 1.0 : 0.0, right ? 1.0 : 0.0};
+    case kTurnRate: return {-wheel_base_mm / 2, wheel_base_mm / 2};
+    case kBodyDrift: return {along, along, across};
+    case kWorldDrift: return {0, 0, 0, along, across};
     default: return {};
   }
 }
+
+/// |v|, usable in constant expressions.
+[[nodiscard]] constexpr double magnitude(double v) { return v < 0 ? -v : v; }
 
 [[nodiscard]] constexpr double limited(double value, double limit) { return std::clamp(value, -limit, limit); }
 

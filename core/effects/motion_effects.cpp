@@ -11,8 +11,6 @@ using Target = EffectSettings::Target;
 
 namespace {
 
-double magnitude(double v) { return v < 0 ? -v : v; }
-
 UnitOffsets offsets_of(const Term& term, double half_base_mm) {
   return unit_offsets(term.target, term.left, term.right, term.along, term.across, 2 * half_base_mm);
 }

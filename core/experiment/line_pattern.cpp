@@ -13,7 +13,7 @@ namespace kilotwin {
 namespace {
 
 constexpr std::size_t kMostOctets = 9, kLongestPattern = 256;
-constexpr int kDecimal = 10, kHexadecimal = 16;
+constexpr int kDecimal = 10, kHex = 16;
 
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
 
@@ -29,7 +29,7 @@ std::optional<std::uint64_t> take_number(std::string_view& rest) {
   const char* const begin = rest.data() + (is_hexadecimal ? 2 : 0);
   const char* const last = rest.data() + rest.size();
   std::uint64_t value = 0;
-  const auto [end, error] = std::from_chars(begin, last, value, is_hexadecimal ? kHexadecimal : kDecimal);
+  const auto [end, error] = std::from_chars(begin, last, value, is_hexadecimal ? kHex : kDecimal);
   if (error != std::errc()) return std::nullopt;
   rest.remove_prefix(static_cast<std::size_t>(end - rest.data()));
   return value;

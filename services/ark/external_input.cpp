@@ -13,7 +13,7 @@ namespace kilotwin::ark {
 namespace {
 
 /// Far more than people and programs send between two ticks. What floods beyond it is ignored.
-constexpr std::size_t kMostWaiting = 1000;
+constexpr std::size_t kMostRequests = 1000;
 /// Of all topics. The requests of each are remembered for the whole run.
 constexpr std::size_t kMostClients = 1000;
 constexpr std::size_t kLongestName = 64;
@@ -61,8 +61,8 @@ void ExternalInput::receive(const std::string& topic, const Sample& sample, Make
     // However many requests wait, a run can be paused and stopped.
     const bool is_urgent =
         directive && (directive->kind == DirectiveKind::kPause || directive->kind == DirectiveKind::kStop);
-    if (directive && waiting_.size() >= kMostWaiting && !is_urgent) {
-      refusal = fmt::format("{} requests wait already", kMostWaiting);
+    if (directive && waiting_.size() >= kMostRequests && !is_urgent) {
+      refusal = fmt::format("{} requests wait already", kMostRequests);
     } else {
       note(client, sample.request);
       if (directive) waiting_.push_back(*directive);

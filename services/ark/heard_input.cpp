@@ -8,7 +8,7 @@ namespace kilotwin::ark {
 namespace {
 
 /// Messages that may wait: those of a second in which 100 robots send ten each.
-constexpr std::size_t kMostWaiting = 1000;
+constexpr std::size_t kMostHeard = 1000;
 constexpr float kFarthest_mm = 1e6F;
 
 }  // namespace
@@ -34,7 +34,7 @@ void HeardInput::on_message(const PublicHeardMessage& sample) {
   std::copy(std::begin(sample.message), std::end(sample.message), message.message.begin());
   const std::lock_guard lock(mutex_);
   waiting_.push_back(message);
-  if (waiting_.size() > kMostWaiting) waiting_.pop_front();
+  if (waiting_.size() > kMostHeard) waiting_.pop_front();
 }
 
 std::vector<HeardMessage> HeardInput::take() {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string>
 
+#include "core/os/clocks.hpp"
 #include "idl/manifest.pb.h"
 
 namespace kilotwin::ark {
@@ -12,11 +13,6 @@ constexpr double kMostPerSecond = 60;
 /// Bytes per second that states of large swarms may take, and bytes per robot in a state.
 constexpr double kMostBytesPerSecond = 32e6, kBytesPerRobot = 28;
 constexpr auto kRepeatEvery = std::chrono::milliseconds(500);
-
-std::int64_t utc_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 /// Sequences of a sample that is only written borrow the columns.
 template <class Sequence, class Value> void borrow(Sequence& sequence, const std::vector<Value>& column) {
@@ -65,7 +61,7 @@ void SwarmStream::write(const SwarmView& swarm) {
   state.run = plan_.run();
   state.tick = swarm.tick.count();
   state.time_s = plan_.tick_length.seconds_at(swarm.tick);
-  state.wall_ns = utc_ns();
+  state.wall_ns = os::utc_ns();
   borrow(state.x_mm, swarm.x_mm);
   borrow(state.y_mm, swarm.y_mm);
   borrow(state.heading_rad, swarm.heading_rad);

@@ -15,7 +15,7 @@ namespace kilotwin::ark {
 namespace {
 
 /// Samples that may wait for the station: two seconds of 16 trackers at 30 Hz.
-constexpr std::size_t kMostWaiting = 1024;
+constexpr std::size_t kMostFramesWaiting = 1024;
 constexpr std::size_t kMostSources = 16;
 /// As many frames as a writer repeats.
 constexpr std::size_t kRecent = 64;
@@ -139,7 +139,7 @@ void TrackerInput::on_sample(const PublicTrackerFrame& sample) {
     return;
   }
   waiting_.push_back(std::move(waiting));
-  if (waiting_.size() <= kMostWaiting) return;
+  if (waiting_.size() <= kMostFramesWaiting) return;
   waiting_.pop_front();
   ++flooded_;
 }

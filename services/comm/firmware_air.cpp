@@ -13,7 +13,6 @@
 namespace kilotwin::comm {
 namespace {
 
-constexpr std::uint32_t kLastDraw = (1u << 17) - 1;
 /// Number of bits after which any packet has ended: there may be gaps of some bits between its octets.
 constexpr Cycles kLongestPacket = 13 * (kBitsPerOctet + 2);
 

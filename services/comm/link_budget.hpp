@@ -14,6 +14,9 @@
 
 namespace kilotwin::comm {
 
+/// Draw index of Stream::kReception: the sender's id for its packet, and this value downwards for a tick's overhead packets.
+inline constexpr std::uint32_t kLastDraw = (1u << 17) - 1;
+
 /// With models other than PROPAGATION, all robots within radio.range_mm are heard, and margins are meaningless.
 class LinkBudget {
  public:

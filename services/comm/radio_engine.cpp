@@ -14,8 +14,6 @@ namespace {
 /// Distance whose readings stand for the overhead controller's. It hangs far above the arena, so robots read the weakest
 /// calibrated signal.
 constexpr double kOverheadDistance_mm = 33 + 65;
-/// Draw index of Stream::kReception: the sender's id for its packet, and this value downwards for a tick's overhead packets.
-constexpr std::uint32_t kLastDraw = (1u << 17) - 1;
 
 std::vector<Share> all_shares(const RunPlan& plan) {
   std::vector<Share> shares;

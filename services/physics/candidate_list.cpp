@@ -6,13 +6,13 @@ namespace kilotwin::physics {
 namespace {
 
 /// A wider skin means fewer rebuilds and longer lists. The cost is flat from 8 to 12 mm.
-constexpr double kSkin_mm = 10;
+constexpr double kListSkin_mm = 10;
 /// A list is valid while no body has moved farther, mm: half the skin less a reserve for rounding.
-constexpr double kMostMotion_mm = 0.499 * kSkin_mm;
+constexpr double kMostMotion_mm = 0.499 * kListSkin_mm;
 
 }  // namespace
 
-CandidateList::CandidateList(double cutoff_mm) : cells_(cutoff_mm + kSkin_mm), first_(1, 0) {}
+CandidateList::CandidateList(double cutoff_mm) : cells_(cutoff_mm + kListSkin_mm), first_(1, 0) {}
 
 bool CandidateList::is_good(const Bodies& bodies) const {
   if (robot_ != bodies.robot) return false;

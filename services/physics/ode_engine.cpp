@@ -14,7 +14,6 @@
 namespace kilotwin::physics {
 namespace {
 
-constexpr std::uint32_t kNone = 0xffffffff;
 constexpr double kGravity_mm_s2 = 9806.65;
 /// An undriven robot below both values is at rest; its velocity is set to 0.
 constexpr double kRestSpeed_mm_s = 0.01, kRestSpin_rad_s = 0.001;
@@ -235,7 +234,7 @@ void OdeEngine::fill_drives(Tick from) {
   const std::vector<std::uint8_t>& driven = population_.driven();
   drives_.reserve(known.size());
   drives_.count = 0;
-  drive_of_.assign(now_.size(), kNone);
+  drive_of_.assign(now_.size(), kUndriven);
   for (std::uint32_t i = 0; i < known.size(); ++i) {
     if (driven[i] == 0 || not_simulated_[i] != 0) continue;
     drive_of_[i] = static_cast<std::uint32_t>(drives_.count);
@@ -318,7 +317,7 @@ bool OdeEngine::rests(std::span<const std::uint32_t> group) const {
   const Bodies& known = population_.known();
   for (const std::uint32_t i : group) {
     const RigidState& state = now_[i];
-    if (!kind(i).holds_on_slope || drive_of_[i] != kNone ||
+    if (!kind(i).holds_on_slope || drive_of_[i] != kUndriven ||
         square_of(state.velocity_mm_s) > kRestSpeed_mm_s * kRestSpeed_mm_s ||
         square_of(state.spin_rad_s) > kRestSpin_rad_s * kRestSpin_rad_s ||
         scene_.arena.clearance_mm(kind(i).shape, place(i)) < -kRestOverlap_mm) {
@@ -342,7 +341,7 @@ bool OdeEngine::rests(std::span<const std::uint32_t> group) const {
 
 void OdeEngine::step_group(Tick from, std::span<const std::uint32_t> group) {
   const std::uint32_t first = group[0];
-  const bool alone = group.size() == 1 && drive_of_[first] != kNone && stands_free(first);
+  const bool alone = group.size() == 1 && drive_of_[first] != kUndriven && stands_free(first);
   const RigidState before = now_[first];
   if (alone && step_group(from, group, Solver::kExact)) return;
   now_[first] = before;

@@ -125,6 +125,7 @@ class OdeEngine final : public PopulationEngine {
 
   // Within a step; per body: known robots, then all movable bodies.
   Drives drives_;
+  static constexpr std::uint32_t kUndriven = 0xffffffff;  ///< in drive_of_
   std::vector<std::uint32_t> drive_of_, leader_, in_world_;
   /// 1: the body is not simulated: immobile, tracked, or a ghost at the rim, which keeps its velocity.
   std::vector<std::uint8_t> not_simulated_;

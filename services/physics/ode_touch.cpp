@@ -6,7 +6,6 @@
 namespace kilotwin::physics {
 namespace {
 
-constexpr std::uint32_t kNone = 0xffffffff;
 /// Above this speed, friction acts against the velocity; below it, against the slope.
 constexpr double kSlidingSpeed_mm_s = 0.1;
 /// Number of rim points on which a cylinder stands, and their x coordinates for radius 1.
@@ -24,7 +23,7 @@ void OdeEngine::touch_floor(std::uint32_t i) {
   touch.body = in_world_[i];
   touch.other = TouchPoint::kStanding;
   touch.normal = {0, 0, 1};
-  if (drive_of_[i] != kNone) return touch_floor_driven(touch, i, ahead, drive_of_[i]);
+  if (drive_of_[i] != kUndriven) return touch_floor_driven(touch, i, ahead, drive_of_[i]);
 
   const Kind& body = kind(i);
   const double speed_x = state.velocity_mm_s[0], speed_y = state.velocity_mm_s[1];

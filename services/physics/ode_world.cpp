@@ -8,6 +8,7 @@
 #include <ode/ode.h>
 
 #include "core/base/error.hpp"
+#include "services/physics/contact_limits.hpp"
 
 namespace kilotwin::physics {
 namespace {
@@ -20,8 +21,6 @@ constexpr double kErrorReduction = 0.8;
 constexpr double kCompliance_1_g = 1e-7;
 /// Compliance of dry friction, where it causes creep: with 1e-7, four robots would move a box of 18 g by 1 um/s.
 constexpr double kGripCompliance_1_g = 1e-12;
-/// Largest speed at which overlapping bodies separate, mm/s: the same as in the planar engine.
-constexpr double kSeparation_mm_s = 20;
 /// Sweeps of the iterative solver. Where robots push a movable body, their forces add up to nearly the friction limit, and the
 /// solver's error is creep: 0.2 mm/s for four robots in a row with 20 sweeps, 2e-4 mm/s with 200. Groups of more than 32
 /// bodies get fewer sweeps, to bound the time.

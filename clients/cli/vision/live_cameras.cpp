@@ -18,6 +18,7 @@
 #include "clients/cli/commands.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
+#include "core/os/clocks.hpp"
 #include "core/os/files.hpp"
 #include "core/os/interrupt.hpp"
 #include "core/os/worker_pool.hpp"
@@ -34,11 +35,6 @@ using cameras::Scene;
 
 /// Where the state stands still, a picture is taken as often as this: its stamp tells that the arena still looks so.
 constexpr auto kRetake = 250ms;
-
-std::int64_t utc_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 /// Lets through at most so many frames per second, on average, of states that come when they come.
 class FrameRate {
@@ -149,7 +145,7 @@ class Live {
     const bool for_big = studio_->big() != nullptr && looked_at;
     const bool for_ark = directory_ && directory_->wants_pictures();
     if (!for_big && !for_ark) return;
-    if (!is_new_) stamp_.capture_ns = std::max(stamp_.capture_ns, utc_ns());
+    if (!is_new_) stamp_.capture_ns = std::max(stamp_.capture_ns, os::utc_ns());
     rate_.spend();
     if (for_big) take_big();
     if (for_ark) take_ark();

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "clients/track/led.hpp"
+#include "core/os/clocks.hpp"
 
 namespace kilotwin::cli {
 
@@ -29,9 +30,7 @@ void TrackerStream::publish(std::uint64_t frame, std::int64_t capture_ns,
     }
     if (robot.led_known) one.led = track::bits_of(robot.led);
   }
-  sample.sent_ns =
-      std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
-          .count();
+  sample.sent_ns = os::steady_ns();
   writer_.write(sample);
 }
 

@@ -20,7 +20,6 @@ constexpr std::size_t kLongestLine = 16U << 20U;
 constexpr double kDefaultArkUnit_s = 1, kDefaultLarsUnit_s = 0.001;
 /// Codes of colours in both logs: off, red, green, blue.
 constexpr std::array<std::uint8_t, 4> kLed{0, 3, 3 << 2, 3 << 4};
-constexpr std::uint8_t kLedUnknown = 255;
 
 std::unique_ptr<std::istream> opened(const std::filesystem::path& file) {
   std::error_code ignored;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/base/pose.hpp"
+#include "core/os/clocks.hpp"
 
 namespace kilotwin::doors::ros2 {
 namespace {
@@ -126,9 +127,8 @@ template <class T> struct Readers::Of : Any {
       : reader(participant, channel<T>(topic.name, dds::Delivery::kSensor),
                [robot = topic.robot, index, &inbox](const T& sample, dds::SampleState state) {
                  if (!state.valid) return;
-                 const auto now = std::chrono::system_clock::now().time_since_epoch();
-                 for (Message& message : read(sample, robot))
-                   inbox.put({index, std::move(message), std::chrono::duration_cast<nanoseconds>(now).count()});
+                 const std::int64_t arrived_ns = os::utc_ns();
+                 for (Message& message : read(sample, robot)) inbox.put({index, std::move(message), arrived_ns});
                }) {}
   dds::Reader<T> reader;
 };

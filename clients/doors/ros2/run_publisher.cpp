@@ -4,16 +4,12 @@
 #include <cmath>
 
 #include "clients/doors/ros2/messages.hpp"
+#include "core/os/clocks.hpp"
 
 namespace kilotwin::doors::ros2 {
 namespace {
 
-constexpr double kNsPerS = 1e9;
-
-std::int64_t utc_ns() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
-}
+constexpr double kRunNsPerS = 1e9;
 
 }  // namespace
 
@@ -70,7 +66,7 @@ void RunPublisher::publish() {
   }
   if (!snapshot) return;
   // The clock goes first: nodes must know the time of a stamp when they see it.
-  if (clock_) clock_->write(Clock{time_of(std::llround(snapshot->time_s * kNsPerS))});
+  if (clock_) clock_->write(Clock{time_of(std::llround(snapshot->time_s * kRunNsPerS))});
   if (poses_) write_poses(*snapshot);
   ++published_;
 }
@@ -82,7 +78,7 @@ void RunPublisher::write_poses(const Snapshots::Snapshot& snapshot) {
   for (const Snapshots::Pose& pose : snapshot.poses)
     poses.push_back(pose_of(door_.placement.from_arena(pose.x_mm, pose.y_mm, pose.heading_rad)));
   PoseArray sample{};
-  sample.header.stamp = time_of(clock_ ? std::llround(snapshot.time_s * kNsPerS) : utc_ns());
+  sample.header.stamp = time_of(clock_ ? std::llround(snapshot.time_s * kRunNsPerS) : os::utc_ns());
   sample.header.frame_id = frame_id.data();
   sample.poses._length = sample.poses._maximum = static_cast<std::uint32_t>(poses.size());
   sample.poses._buffer = poses.data();
