@@ -31,7 +31,7 @@ constexpr double kPrior_sd = 1;
 constexpr std::size_t kFewestSamples = 400;
 
 /// Columns of the log variance over one covariate.
-struct Candidate {
+struct NoiseForm {
   std::string name;
   std::vector<std::string> covariates;
   Eigen::MatrixXd columns;         ///< samples x columns
@@ -58,8 +58,8 @@ std::vector<std::size_t> folds_by_robot(const Samples& samples) {
   return folds;
 }
 
-Candidate of_robots(const Samples& samples) {
-  Candidate out{"noise-by-robot", {"robot"}, {}, {}, {}};
+NoiseForm of_robots(const Samples& samples) {
+  NoiseForm out{"noise-by-robot", {"robot"}, {}, {}, {}};
   std::map<std::uint32_t, Eigen::Index> column;
   for (const NoiseSample& sample : samples) column.emplace(sample.robot, 0);
   Eigen::Index next = 0;
@@ -100,8 +100,8 @@ double cosine(int k, double value, std::pair<double, double> range) {
 
 constexpr int kTimeOrder = 4, kPlaceOrder = 3;
 
-Candidate of_time(const Samples& samples) {
-  Candidate out{"noise-by-time", {"time"}, {}, folds_by_robot(samples), {}};
+NoiseForm of_time(const Samples& samples) {
+  NoiseForm out{"noise-by-time", {"time"}, {}, folds_by_robot(samples), {}};
   const auto range = range_of(samples, [](const NoiseSample& s) { return s.time_s; });
   const auto row = [range](double time_s) {
     Eigen::RowVectorXd r(kTimeOrder + 1);
@@ -125,8 +125,8 @@ Candidate of_time(const Samples& samples) {
   return out;
 }
 
-Candidate of_place(const Samples& samples) {
-  Candidate out{"noise-by-place", {"position"}, {}, folds_by_robot(samples), {}};
+NoiseForm of_place(const Samples& samples) {
+  NoiseForm out{"noise-by-place", {"position"}, {}, folds_by_robot(samples), {}};
   const auto xs = range_of(samples, [](const NoiseSample& s) { return s.x_mm; });
   const auto ys = range_of(samples, [](const NoiseSample& s) { return s.y_mm; });
   const auto row = [xs, ys](double x_mm, double y_mm) {
@@ -246,7 +246,7 @@ class VarianceFit {
 };
 
 /// The cross-validated gain and its standard error over stretches.
-std::pair<double, double> cross_validated(const VarianceFit& fit, const Candidate& candidate,
+std::pair<double, double> cross_validated(const VarianceFit& fit, const NoiseForm& candidate,
                                           const Samples& samples) {
   std::map<std::pair<std::size_t, std::size_t>, double> stretches;
   double sum = 0;
@@ -267,7 +267,7 @@ std::pair<double, double> cross_validated(const VarianceFit& fit, const Candidat
 }
 
 /// The candidate as an effect, if it passes.
-std::optional<NoiseEffect> accepted(const VarianceFit& fit, const Candidate& candidate, const Samples& samples,
+std::optional<NoiseEffect> accepted(const VarianceFit& fit, const NoiseForm& candidate, const Samples& samples,
                                     Eigen::VectorXd& log_scale) {
   NoiseEffect out;
   out.name = candidate.name;
@@ -299,7 +299,7 @@ std::vector<NoiseEffect> find_noise_effects(const std::vector<NoiseSample>& all)
     if (!sample.held_out && sample.process.trace() > 0) samples.push_back(sample);
   std::vector<NoiseEffect> found;
   if (samples.size() < kFewestSamples) return found;
-  std::vector<Candidate> candidates;
+  std::vector<NoiseForm> candidates;
   for (const auto& make : {of_robots, of_time, of_place}) candidates.push_back(make(samples));
   Eigen::VectorXd given = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(samples.size()));
   while (!candidates.empty()) {
