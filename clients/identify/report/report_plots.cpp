@@ -61,14 +61,15 @@ std::string axis(const char* which, const std::string& name, const std::string& 
                      gnuplot_text(unit.empty() ? words_of(name) : words_of(name) + ", " + unit));
 }
 
-using Rows = google::protobuf::RepeatedPtrField<google::protobuf::ListValue>;
+using MapRows = google::protobuf::RepeatedPtrField<google::protobuf::ListValue>;
 
 /// Values on a grid, [y][x].
 struct Grid {
   std::vector<double> x, y;
   std::vector<std::vector<double>> value;
 
-  template <typename Map> Grid(const Map& map, const Rows& rows) : x(numbers(map.x_mm())), y(numbers(map.y_mm())) {
+  template <typename Map>
+  Grid(const Map& map, const MapRows& rows) : x(numbers(map.x_mm())), y(numbers(map.y_mm())) {
     for (const google::protobuf::ListValue& row : rows) value.push_back(numbers(row));
   }
   [[nodiscard]] bool good() const {
@@ -77,15 +78,15 @@ struct Grid {
   }
 };
 
-const Rows& rows_of(const identification::ResidualMap& map, When when) {
+const MapRows& rows_of(const identification::ResidualMap& map, When when) {
   return when == When::kBefore ? map.before() : map.after();
 }
 const char* name_of(When when) { return when == When::kBefore ? "before" : "after"; }
 
 /// The 98th percentile of the absolute values.
-double reach(const std::vector<const Rows*>& of) {
+double reach(const std::vector<const MapRows*>& of) {
   std::vector<double> all;
-  for (const Rows* rows : of) {
+  for (const MapRows* rows : of) {
     for (const google::protobuf::ListValue& row : *rows) {
       for (const double v : numbers(row)) {
         if (std::isfinite(v)) all.push_back(std::abs(v));
@@ -152,7 +153,7 @@ PlotNumber coloured(Gnuplot& plots, const Grid& grid, double most, const std::st
 }
 
 /// Values over two covariates in colours.
-PlotNumber plot_table(Gnuplot& plots, const identification::Pattern& pattern, const Rows& rows,
+PlotNumber plot_table(Gnuplot& plots, const identification::Pattern& pattern, const MapRows& rows,
                       const std::string& title) {
   const std::vector<double> at = numbers(pattern.at()), and_at = numbers(pattern.and_at());
   std::vector<std::vector<double>> columns(3);
@@ -303,7 +304,7 @@ PlotNumber plot_map(Gnuplot& plots, const identification::ResidualMap& map, When
 
 PlotNumber plot_pattern(Gnuplot& plots, const identification::Pattern& pattern, Component component) {
   const int which = component == Component::kFirst ? 0 : 1;
-  const Rows& rows = which == 0 ? pattern.first_mm() : pattern.second_mm();
+  const MapRows& rows = which == 0 ? pattern.first_mm() : pattern.second_mm();
   if (which >= pattern.components_size() || rows.empty() || pattern.units_size() != pattern.covariates_size())
     return std::nullopt;
   const std::string title = "error " + pattern.components(which);
