@@ -1,6 +1,6 @@
 // Cost of robots' programs in their host: ns per robot and tick on one core, context switch included, and memory. Programs return
 // from loop(), block in delay(), wait busily, or compute for longer than a tick. Each figure is the fastest of several rounds
-// of one second of simulated time.
+// of one second of simulated time. Prints a table in Markdown: bench/execution.
 // Usage: behaviours_bench [ROBOTS [CASE [ROUNDS]]]     default: 1000 robots, all cases whose name contains CASE, 30 rounds
 #include <algorithm>
 #include <chrono>
@@ -93,7 +93,7 @@ void measure(const Case& one, std::uint32_t robots, int rounds, const fs::path& 
     }
     best_ns = std::min(best_ns, ns / kTicks / robots);
   }
-  std::printf("%-34s %10.1f ns per robot and tick %8.2f KiB per robot\n", one.name, best_ns,
+  std::printf("| %s | %.3g | %.1f |\n", one.name, best_ns,
               static_cast<double>(engine.memory_octets()) / 1024.0 / robots);
 }
 
@@ -105,18 +105,20 @@ int main(int count, char** words) {
   std::string folder = (fs::temp_directory_path() / "kilotwin-bench-XXXXXX").string();
   if (mkdtemp(folder.data()) == nullptr) return 1;
   const std::string own = std::string(KILOTWIN_BEHAVIOURS) + "/disperse.c";
+  std::printf("| program | ns per robot and tick | KiB per robot |\n|---|---|---|\n");
   for (const Case& one :
-       {Case{"disperse, as on the robot", own}, Case{"disperse, loop() once per tick", own, true},
-        Case{"empty loop()", "static void loop(void) {}"},
-        Case{"blocked in delay()", "static void loop(void) { delay(60000); }"},
-        Case{"while (!received);", "static void loop(void) { while (!received); }"},
-        Case{"while (kilo_ticks < t);", "static void loop(void) { while (kilo_ticks < 1000000); }"},
-        Case{"while (!received) ++n;", "static void loop(void) { while (!received) ++sink; }"},
+       {Case{"`disperse.c`, `loop()` as on the robot, the default", own},
+        Case{"`disperse.c`, `loop()` once per tick", own, true},
+        Case{"an empty `loop()`", "static void loop(void) {}"},
+        Case{"`delay(60000);`", "static void loop(void) { delay(60000); }"},
+        Case{"`while (!received);`", "static void loop(void) { while (!received); }"},
+        Case{"`while (kilo_ticks < t);`", "static void loop(void) { while (kilo_ticks < 1000000); }"},
+        Case{"`while (!received) ++n;`", "static void loop(void) { while (!received) ++sink; }"},
         Case{"computes without end",
              "static void loop(void) { for (;;) { sink = sink * 3 + 1; set_color(sink); } }"}}) {
     if (count > 2 && std::string(one.name).find(words[2]) == std::string::npos) continue;
     measure(one,
-            one.name == std::string("computes without end") || one.name == std::string("while (!received) ++n;")
+            one.name == std::string("computes without end") || one.name == std::string("`while (!received) ++n;`")
                 ? std::min(robots, 100u)
                 : robots,
             rounds, folder);

@@ -134,13 +134,13 @@ int main(int argc, char** argv) {
   std::vector<std::vector<double>> msd_mm2(kSeconds / 10);
   for (int seed = 1; seed <= static_cast<int>(constants["seeds"]); ++seed)
     run(static_cast<std::uint64_t>(seed), msd_mm2);
-  std::printf("%6s %12s %8s\n", "t, s", "MSD, mm^2", "s.e.");
+  std::printf("| time, s | mean square displacement, mm² | standard error, mm² |\n|---|---|---|\n");
   for (std::size_t k = 0; k < msd_mm2.size(); ++k) {
     double mean = 0, squares = 0;
     const auto count = static_cast<double>(msd_mm2[k].size());
     for (const double value : msd_mm2[k]) mean += value / count;
     for (const double value : msd_mm2[k]) squares += (value - mean) * (value - mean);
-    std::printf("%6zu %12.0f %8.0f\n", 10 * (k + 1), mean,
+    std::printf("| %zu | %.0f | %.0f |\n", 10 * (k + 1), mean,
                 count > 1 ? std::sqrt(squares / (count - 1) / count) : 0.0);
   }
   return 0;

@@ -1,4 +1,4 @@
-// Figures of firmware robots:
+// Figures of firmware robots, as tables in Markdown (bench/firmware-robots):
 //   firmware_figures agreement    six programs, native and as firmware, 120 s: agreement of motors and LED within a tick
 //   firmware_figures contention   25 robots in range of each other: messages per robot, native and firmware
 //   firmware_figures speed        10 robots on two threads: robot-seconds per second of CPU time, and simulated per wall time
@@ -36,8 +36,10 @@ std::string experiment(const std::string& program, bool avr, std::uint32_t robot
 
 int show_agreement() {
   int status = 0;
-  fmt::print("{:<14}{:>22}{:>22}{:>18}\n", "program", "motors: same/changes", "LED: same/changes",
-             "sent, received");
+  fmt::print(
+      "| program | motors: same of native, firmware | LED: same of native, firmware | sent, received: native | "
+      "firmware |\n"
+      "|---|---|---|---|---|\n");
   for (const std::string name : {"behaviours/blink.c", "behaviours/walk.c", "behaviours/delay_walk.c",
                                  "behaviours/straight.c", "bench/firmware/talker.c", "bench/firmware/ranger.c"}) {
     const auto run = [&](bool avr) {
@@ -49,11 +51,9 @@ int show_agreement() {
     const Agreement led = agreement(native.led, firmware.led, end);
     const bool messages =
         native.totals.sent == firmware.totals.sent && native.totals.received == firmware.totals.received;
-    fmt::print("{:<14}{:>22}{:>22}{:>18}\n", fs::path(name).stem().string(),
-               fmt::format("{}/{},{}", motors.same, motors.first, motors.second),
-               fmt::format("{}/{},{}", led.same, led.first, led.second),
-               fmt::format("{},{} {},{}", native.totals.sent, native.totals.received, firmware.totals.sent,
-                           firmware.totals.received));
+    fmt::print("| `{}` | {} of {}, {} | {} of {}, {} | {}, {} | {}, {} |\n", name, motors.same, motors.first,
+               motors.second, led.same, led.first, led.second, native.totals.sent, native.totals.received,
+               firmware.totals.sent, firmware.totals.received);
     if (!motors.whole() || !led.whole() || !messages) status = 1;
   }
   return status;
@@ -90,6 +90,7 @@ int show_contention() {
       received[avr].insert(received[avr].end(), in.begin(), in.end());
     }
   }
+  fmt::print("| per robot in 60 s | native | firmware | KS distance | at most, at 99 % |\n|---|---|---|---|---|\n");
   int status = 0;
   const auto row = [&](const char* name, const std::vector<double>* samples) {
     const auto mean = [](const std::vector<double>& x) {
@@ -98,9 +99,8 @@ int show_contention() {
       return sum / static_cast<double>(x.size());
     };
     const auto [distance, critical] = kolmogorov_smirnov(samples[0], samples[1]);
-    fmt::print(
-        "{:<24} native {:.2f}, firmware {:.2f} per robot in 60 s; KS distance {:.3f}, at most {:.3f} at 99 %\n",
-        name, mean(samples[0]), mean(samples[1]), distance, critical);
+    fmt::print("| {} | {:.2f} | {:.2f} | {:.3f} | {:.3f} |\n", name, mean(samples[0]), mean(samples[1]), distance,
+               critical);
     if (distance > critical) status = 1;
   };
   row("messages sent", sent);
@@ -121,7 +121,7 @@ double cpu_s() {
 int show_speed() {
   constexpr std::uint32_t kRobots = 10;
   constexpr double kDuration_s = 20;
-  fmt::print("{:<46}{:>26}{:>14}\n", "program", "robot-s per s of CPU time", "x real time");
+  fmt::print("| program | robot-seconds per second of CPU time | times real time |\n|---|---|---|\n");
   for (const char* const program :
        {"bench/firmware/still.c", "behaviours/delay_walk.c", "behaviours/blink.c", "behaviours/disperse.c",
         "behaviours/phototaxis.c", "behaviours/move_to_light.c", "tests/validation/programs/set/counts_loops.c",
@@ -130,7 +130,7 @@ int show_speed() {
                              "light { source { height_mm: 60 intensity: 1500 } }\n";
     const double begun_s = cpu_s();
     const Timeline timeline = run_timeline(text, folder(), 2);
-    fmt::print("{:<46}{:>26.0f}{:>14.1f}\n", program, kRobots * kDuration_s / (cpu_s() - begun_s),
+    fmt::print("| `{}` | {:.0f} | {:.1f} |\n", program, kRobots * kDuration_s / (cpu_s() - begun_s),
                kDuration_s / timeline.totals.wall_s);
   }
   return 0;

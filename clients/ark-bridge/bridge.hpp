@@ -21,7 +21,7 @@ struct ArkRobot {
   int colour = 0;               ///< 0 off, 1 red, 2 green, 3 blue
 };
 
-/// What ARK's signals take.
+/// The arguments of ARK's signals.
 struct ArkSignal {
   std::uint16_t id = 0;    ///< ARK's id of the robot
   std::uint8_t type = 0;   ///< 0 to 15
@@ -42,7 +42,7 @@ using ArkOrder = std::variant<ArkSignal, ArkBroadcast, ArkStop>;
 /// Commands of a packet for an overhead controller: idl/public.idl.
 inline constexpr std::uint8_t kStopCommand = 0, kRepeatCommand = 2, kOnceCommand = 6;
 
-/// What a packet of the simulated station means to the real ARK. Messages to robots that are not tracked are left out:
+/// The orders to the real ARK that a packet of the simulated station means. Messages to robots that are not tracked are left out:
 /// the simulated radio brings them. `message`: data[9], type.
 [[nodiscard]] std::vector<ArkOrder> orders_of(std::uint8_t command, std::span<const std::uint8_t, 10> message,
                                               const RobotNames& names, Tally& tally);
@@ -61,7 +61,7 @@ class ArkBridge {
 
   /// Publishes one frame. `captured_ns`: when ARK handed the robots over, ns of UTC.
   void publish(std::span<const ArkRobot> robots, std::int64_t captured_ns);
-  /// What has come from the station since the last call, in order.
+  /// The orders that came from the station since the last call, in order.
   [[nodiscard]] std::vector<ArkOrder> take();
   [[nodiscard]] const Door& door() const { return door_; }
   /// Whether a run reads what is published.

@@ -1,4 +1,4 @@
-/// What stands still in a camera's picture: floor, walls, obstacles, under room light and through the lens.
+/// The parts of a camera's picture that stand still: floor, walls, obstacles, under room light and through the lens.
 #pragma once
 
 #include <opencv2/core.hpp>

@@ -23,7 +23,7 @@ struct CameraModel {
   cv::Vec3d position_mm{0, 0, 2000};  ///< of the optical centre, arena frame; z above 0
   Distortion distortion;
 
-  // What the camera does to light. Brightness is in grey levels 0..255; the defaults are those of a perfect camera.
+  // The camera's effects on light. Brightness is in grey levels 0..255; the defaults are those of a perfect camera.
   double gain = 1;
   double exposure_s = 0;  ///< robots are smeared along their motion over this time, which is centred at the capture
   double blur_px = 0;     ///< standard deviation of the lens' point spread

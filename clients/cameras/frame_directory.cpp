@@ -145,7 +145,7 @@ void FrameDirectory::put(std::vector<std::string> pictures) {
   for (const std::uint32_t number : numbers) {
     Frame& frame = frames_[number];
     frame.there.resize(opened_.size());
-    // Whoever joins in a frame that is being read gets the picture that belongs to it.
+    // A reader that joins in a frame that is being read gets the picture that belongs to it.
     const bool keeps = frame.content && being_read(frame);
     if (!keeps) {
       frame.content = newest;

@@ -27,7 +27,7 @@ struct Posted {
 };
 using PostedPicture = std::shared_ptr<const Posted>;
 
-/// What libwebsockets keeps for each connection. It is zeroed memory: `sending` lives from begin() to end().
+/// The data that libwebsockets keeps for each connection. It is zeroed memory: `sending` lives from begin() to end().
 struct Client {
   enum class Kind : std::uint8_t { kNone, kStream, kPicture, kPage } kind;
   PostedPicture* sending;

@@ -9,7 +9,7 @@
 
 namespace kilotwin::cameras {
 
-/// What a picture shows and when it was taken.
+/// The content of a picture, and when it was taken.
 struct FrameStamp {
   std::uint64_t frame = 0;  ///< of this camera, counted from 0
   std::uint64_t run = 0;

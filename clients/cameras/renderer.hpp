@@ -28,7 +28,7 @@ struct RobotView {
   double vx_mm_s = 0, vy_mm_s = 0, turn_rad_s = 0;  ///< its motion during the exposure
 };
 
-/// What a camera sees at one instant.
+/// The scene under a camera at one instant.
 struct Scene {
   std::vector<RobotView> robots;
   std::vector<Pose> movables;  ///< of the world's movable bodies, in their order

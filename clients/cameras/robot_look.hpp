@@ -1,4 +1,4 @@
-/// What a Kilobot looks like from above: measures and colours. Free of OpenCV, so that trackers can read the measures too.
+/// The look of a Kilobot from above: measures and colours. Free of OpenCV, so that trackers can read the measures too.
 ///
 /// Measures are in the robot's frame: x forward, y left, origin at the centre of the disc. Colours are blue, green, red in
 /// grey levels 0..255 as a camera with gain 1 shows them.

@@ -1,5 +1,4 @@
-// The headers of the file are flatbuffers. The numbers of their fields, unions and enumerations are those of Arrow's Schema.fbs,
-// Message.fbs and File.fbs.
+// Reads the format of core/arrow/format.hpp.
 #include "clients/importers/arrow_file.hpp"
 
 #include <flatbuffers/flatbuffers.h>
@@ -12,6 +11,7 @@
 #include <string_view>
 #include <utility>
 
+#include "core/arrow/format.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/os/files.hpp"
@@ -19,27 +19,9 @@
 namespace kilotwin::importers {
 namespace {
 
-constexpr std::string_view kMagic = "ARROW1";
-constexpr std::uint8_t kNull = 1, kInt = 2, kFloatingPoint = 3, kBinary = 4, kUtf8 = 5, kLargeBinary = 19,
-                       kLargeUtf8 = 20;           // Type
-constexpr std::uint8_t kRecordBatch = 3;          // MessageHeader
-constexpr std::int16_t kSingle = 1, kDouble = 2;  // Precision
+using arrow::Block, arrow::Buffer, arrow::FieldNode, arrow::Header, arrow::Type;
 
-/// Structs of the format, which stand in vectors without a table around.
-struct FieldNode {
-  std::int64_t length, missing;
-};
-struct Buffer {
-  std::int64_t offset, length;
-};
-struct Block {
-  std::int64_t offset;
-  std::int32_t head, padding;
-  std::int64_t body;
-};
-
-/// Place of a table's field by its number.
-constexpr flatbuffers::voffset_t at(int field) { return static_cast<flatbuffers::voffset_t>(4 + 2 * field); }
+constexpr flatbuffers::voffset_t at(int field) { return arrow::place_of(field); }
 
 using flatbuffers::Verifier;
 template <class T> using Vector = flatbuffers::Vector<T>;
@@ -81,7 +63,7 @@ struct FloatingPoint : Checked {
 
 struct Field : Checked {
   [[nodiscard]] const flatbuffers::String* name() const { return GetPointer<const flatbuffers::String*>(at(0)); }
-  [[nodiscard]] std::uint8_t kind() const { return GetField<std::uint8_t>(at(2), 0); }
+  [[nodiscard]] Type kind() const { return static_cast<Type>(GetField<std::uint8_t>(at(2), 0)); }
   [[nodiscard]] const Int* as_int() const { return GetPointer<const Int*>(at(3)); }
   [[nodiscard]] const FloatingPoint* as_floating_point() const { return GetPointer<const FloatingPoint*>(at(3)); }
   [[nodiscard]] bool has_dictionary() const { return GetPointer<const void*>(at(4)) != nullptr; }
@@ -89,8 +71,8 @@ struct Field : Checked {
   bool Verify(Verifier& v) const {
     return VerifyTableStart(v) && VerifyOffset(v, at(0)) && v.VerifyString(name()) &&
            VerifyField<std::uint8_t>(v, at(2), 1) && VerifyOffset(v, at(3)) &&
-           (kind() != kInt || v.VerifyTable(as_int())) &&
-           (kind() != kFloatingPoint || v.VerifyTable(as_floating_point())) && VerifyOffset(v, at(4)) &&
+           (kind() != Type::kInt || v.VerifyTable(as_int())) &&
+           (kind() != Type::kFloatingPoint || v.VerifyTable(as_floating_point())) && VerifyOffset(v, at(4)) &&
            VerifyOffset(v, at(5)) && v.VerifyVector(children()) && v.VerifyVectorOfTables(children()) &&
            v.EndTable();
   }
@@ -134,11 +116,11 @@ struct RecordBatch : Checked {
 };
 
 struct Message : Checked {
-  [[nodiscard]] std::uint8_t kind() const { return GetField<std::uint8_t>(at(1), 0); }
+  [[nodiscard]] Header kind() const { return static_cast<Header>(GetField<std::uint8_t>(at(1), 0)); }
   [[nodiscard]] const RecordBatch* batch() const { return GetPointer<const RecordBatch*>(at(2)); }
   bool Verify(Verifier& v) const {
     return VerifyTableStart(v) && VerifyField<std::uint8_t>(v, at(1), 1) && VerifyOffset(v, at(2)) &&
-           (kind() != kRecordBatch || v.VerifyTable(batch())) && v.EndTable();
+           (kind() != Header::kRecordBatch || v.VerifyTable(batch())) && v.EndTable();
   }
 };
 
@@ -154,8 +136,8 @@ class ArrowReader {
       : name_(one_line(file.string())), octets_(os::read_file(file)) {}
 
   ArrowFile result() {
-    constexpr std::size_t kTail = sizeof(std::int32_t) + kMagic.size();
-    if (octets_.size() < 8 + kTail || !octets_.starts_with(kMagic) || !octets_.ends_with(kMagic))
+    constexpr std::size_t kTail = sizeof(std::int32_t) + arrow::kMagic.size();
+    if (octets_.size() < 8 + kTail || !octets_.starts_with(arrow::kMagic) || !octets_.ends_with(arrow::kMagic))
       throw UserError(name_ + ": is no Arrow file (Feather, version 2)");
     const auto size = number_at<std::int32_t>(part(octets_.size() - kTail, sizeof(std::int32_t)), 0);
     if (size < 0) damaged();
@@ -205,7 +187,7 @@ class ArrowReader {
     const auto offset = static_cast<std::uint64_t>(block.offset);
     const std::string_view header = part(offset, block.head), body = part(offset + header.size(), block.body);
     const Message& message = verified<Message>(header.substr(kPrefix));
-    if (message.kind() != kRecordBatch || message.batch() == nullptr) damaged();
+    if (message.kind() != Header::kRecordBatch || message.batch() == nullptr) damaged();
     const RecordBatch& batch = *message.batch();
     if (batch.compressed())
       throw UserError(name_ +
@@ -221,15 +203,16 @@ class ArrowReader {
     const auto rows = static_cast<std::size_t>(batch.length());
     for (const Field* field : *fields_) {
       const bool is_encoded = field->has_dictionary();
-      if (field->kind() == kNull && !is_encoded) continue;  // the only kind without buffers
+      if (field->kind() == Type::kNull && !is_encoded) continue;  // the only kind without buffers
       const std::string_view valid = next();
       if (!valid.empty() && valid.size() * 8 < rows) damaged();
       const auto is_there = [&](std::size_t row) {
         return valid.empty() || (static_cast<unsigned char>(valid[row / 8]) >> row % 8 & 1) != 0;
       };
-      const bool is_text = field->kind() == kUtf8 && !is_encoded;
+      const bool is_text = field->kind() == Type::kUtf8 && !is_encoded;
       const bool is_other_text =
-          !is_encoded && (field->kind() == kBinary || field->kind() == kLargeBinary || field->kind() == kLargeUtf8);
+          !is_encoded && (field->kind() == Type::kBinary || field->kind() == Type::kLargeBinary ||
+                          field->kind() == Type::kLargeUtf8);
       const std::string_view first = next();
       const std::string_view second = is_text || is_other_text ? next() : std::string_view();
       if (field->name() == nullptr) continue;
@@ -265,11 +248,11 @@ class ArrowReader {
                                                : std::numeric_limits<double>::quiet_NaN());
     };
     if (field.has_dictionary()) return;
-    if (field.kind() == kFloatingPoint && field.as_floating_point() != nullptr) {
-      if (field.as_floating_point()->precision() == kDouble) add(double{});
-      if (field.as_floating_point()->precision() == kSingle) add(float{});
+    if (field.kind() == Type::kFloatingPoint && field.as_floating_point() != nullptr) {
+      if (field.as_floating_point()->precision() == arrow::kDouble) add(double{});
+      if (field.as_floating_point()->precision() == arrow::kSingle) add(float{});
     }
-    if (field.kind() != kInt || field.as_int() == nullptr) return;
+    if (field.kind() != Type::kInt || field.as_int() == nullptr) return;
     const bool is_signed = field.as_int()->is_signed();
     switch (field.as_int()->bits()) {
       case 8: return is_signed ? add(std::int8_t{}) : add(std::uint8_t{});

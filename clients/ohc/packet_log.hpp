@@ -1,4 +1,4 @@
-/// What a user of `kilotwin ohc` sees of the packets: a line where their kind changes, and counts at the end.
+/// The lines about packets that a user of `kilotwin ohc` sees: a line where their kind changes, and counts at the end.
 #pragma once
 
 #include <array>

@@ -85,7 +85,7 @@ class PortServer {
     repeat_at_ = Clock::now() + kStartUp;
   }
 
-  /// What the controller was sent while it started.
+  /// Sends again the last command, which the controller was sent while it started.
   void repeat() {
     repeat_at_.reset();
     const bool lasts =

@@ -20,7 +20,7 @@ class SerialPort {
   /// Opens it as station programs do: 38400 baud, 8N1, raw, no flow control, for this process alone. Returns why it cannot,
   /// or an empty string.
   [[nodiscard]] std::string open();
-  /// What has not left yet is dropped: the system would wait for it.
+  /// Octets that have not left yet are dropped: the system would wait for it.
   void close();
   [[nodiscard]] bool is_open() const { return port_.get() >= 0; }
   /// Sends a packet and waits until it has left. False where the port is gone, or does not move for the time of its patience;

@@ -1,5 +1,5 @@
-/// When the controller of real robots gets a STOP that nobody sent: the run has ended, or its station has fallen silent. What the
-/// robots were told last would go on otherwise.
+/// When the controller of real robots gets a STOP that nobody sent: the run has ended, or its station has fallen silent. Otherwise
+/// the robots would go on with their last command.
 #pragma once
 
 #include <chrono>

@@ -1,5 +1,4 @@
-// The format: https://arrow.apache.org/docs/format/Columnar.html. Its headers are flatbuffers. The numbers of their fields, unions
-// and enumerations are those of Arrow's Schema.fbs, Message.fbs and File.fbs.
+// Writes the format of core/arrow/format.hpp.
 #include "clients/recorder/arrow_table.hpp"
 
 #include <flatbuffers/flatbuffers.h>
@@ -9,6 +8,7 @@
 #include <limits>
 
 #include "clients/recorder/utf8.hpp"
+#include "core/arrow/format.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::recorder {
@@ -17,26 +17,9 @@ namespace {
 using Builder = flatbuffers::FlatBufferBuilder;
 using Offset = flatbuffers::Offset<void>;
 
-constexpr std::string_view kMagic = "ARROW1";
 constexpr std::uint32_t kContinuation = 0xffffffff;
 constexpr std::size_t kAlignment = 8;
 constexpr std::int16_t kVersion5 = 4;
-enum class Header : std::uint8_t { kSchema = 1, kRecordBatch = 3 };
-enum class Type : std::uint8_t { kInt = 2, kFloatingPoint = 3, kUtf8 = 5 };
-constexpr std::int16_t kDouble = 2;
-
-/// Structs of the format, which stand in vectors without a table around.
-struct FieldNode {
-  std::int64_t length, missing;
-};
-struct Buffer {
-  std::int64_t offset, length;
-};
-struct Block {
-  std::int64_t offset;
-  std::int32_t head, padding;
-  std::int64_t body;
-};
 
 std::size_t padded(std::size_t size) { return (size + kAlignment - 1) / kAlignment * kAlignment; }
 
@@ -45,17 +28,16 @@ class TableBuilder {
  public:
   explicit TableBuilder(Builder& builder) : builder_(builder), start_(builder.StartTable()) {}
   template <class Number> TableBuilder& number(int field, Number value) {
-    builder_.AddElement<Number>(place(field), value);
+    builder_.AddElement<Number>(arrow::place_of(field), value);
     return *this;
   }
   template <class T> TableBuilder& offset(int field, flatbuffers::Offset<T> to) {
-    builder_.AddOffset(place(field), to);
+    builder_.AddOffset(arrow::place_of(field), to);
     return *this;
   }
   [[nodiscard]] Offset end() { return Offset(builder_.EndTable(start_)); }
 
  private:
-  static flatbuffers::voffset_t place(int field) { return static_cast<flatbuffers::voffset_t>(4 + 2 * field); }
   Builder& builder_;
   flatbuffers::uoffset_t start_;
 };
@@ -70,20 +52,20 @@ auto pairs(Builder& builder, const TableMetadata& metadata) {
 }
 
 Offset field(Builder& builder, const Column& column) {
-  Type type{};
+  arrow::Type type{};
   Offset described;
   switch (column.type) {
     case CellType::kInteger:
-      type = Type::kInt;
+      type = arrow::Type::kInt;
       described = TableBuilder(builder).number<std::int32_t>(0, 64).number<std::uint8_t>(1, 1).end();
       break;
     case CellType::kNumber:
     case CellType::kTime:
-      type = Type::kFloatingPoint;
-      described = TableBuilder(builder).number(0, kDouble).end();
+      type = arrow::Type::kFloatingPoint;
+      described = TableBuilder(builder).number(0, arrow::kDouble).end();
       break;
     case CellType::kText:
-      type = Type::kUtf8;
+      type = arrow::Type::kUtf8;
       described = TableBuilder(builder).end();
       break;
   }
@@ -114,7 +96,7 @@ std::string finished(Builder& builder, Offset root) {
   return {reinterpret_cast<const char*>(builder.GetBufferPointer()), builder.GetSize()};
 }
 
-std::string message(Builder& builder, Header kind, Offset header, std::size_t body) {
+std::string message(Builder& builder, arrow::Header kind, Offset header, std::size_t body) {
   return finished(builder, TableBuilder(builder)
                                .number(0, kVersion5)
                                .number(1, static_cast<std::uint8_t>(kind))
@@ -131,12 +113,12 @@ ArrowTable::ArrowTable(std::filesystem::path file, std::vector<Column> columns, 
       metadata_(metadata),
       output_(std::move(file), os::OutputFile::Existing::kReplace) {
   cells_.resize(columns_);
-  std::string begin(kMagic);
+  std::string begin(arrow::kMagic);
   begin.resize(padded(begin.size()));
   write(begin.data(), begin.size());
   Builder builder;
   const Offset header = schema(builder, described_, metadata_);
-  write_message(message(builder, Header::kSchema, header, 0), {});
+  write_message(message(builder, arrow::Header::kSchema, header, 0), {});
 }
 
 void ArrowTable::write(const void* octets, std::size_t size) {
@@ -213,8 +195,8 @@ void ArrowTable::end_row() {
 }
 
 void ArrowTable::write_batch() {
-  std::vector<FieldNode> nodes;
-  std::vector<Buffer> buffers;
+  std::vector<arrow::FieldNode> nodes;
+  std::vector<arrow::Buffer> buffers;
   std::string body;
   const auto add = [&](const void* octets, std::size_t size) {
     buffers.push_back({static_cast<std::int64_t>(body.size()), static_cast<std::int64_t>(size)});
@@ -240,7 +222,7 @@ void ArrowTable::write_batch() {
                            .offset(1, of_nodes)
                            .offset(2, of_buffers)
                            .end();
-  batches_.push_back(write_message(message(builder, Header::kRecordBatch, batch, body.size()), body));
+  batches_.push_back(write_message(message(builder, arrow::Header::kRecordBatch, batch, body.size()), body));
   rows_of_batch_ = 0;
 }
 
@@ -249,10 +231,10 @@ void ArrowTable::close() {
   const std::uint32_t end[] = {kContinuation, 0};
   write(end, sizeof end);
   Builder builder;
-  std::vector<Block> blocks;
+  std::vector<arrow::Block> blocks;
   for (const Place& place : batches_) blocks.push_back({place.offset, place.head, 0, place.body});
   const auto of_blocks = builder.CreateVectorOfStructs(blocks);
-  const auto no_dictionaries = builder.CreateVectorOfStructs(std::vector<Block>{});
+  const auto no_dictionaries = builder.CreateVectorOfStructs(std::vector<arrow::Block>{});
   const Offset about = schema(builder, described_, metadata_);
   const std::string footer = finished(builder, TableBuilder(builder)
                                                    .number(0, kVersion5)
@@ -263,7 +245,7 @@ void ArrowTable::close() {
   write(footer.data(), footer.size());
   const auto size = static_cast<std::int32_t>(footer.size());
   write(&size, sizeof size);
-  write(kMagic.data(), kMagic.size());
+  write(arrow::kMagic.data(), arrow::kMagic.size());
   output_.close();
 }
 

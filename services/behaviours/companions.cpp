@@ -13,7 +13,7 @@ namespace kilotwin::behaviours {
 namespace fs = std::filesystem;
 namespace {
 
-/// What an earlier search found for a program: a file in the cache. Its first line is the state of the program and of the files
+/// The result of an earlier search for a program: a file in the cache. Its first line is the state of the program and of the files
 /// around it then; each further line is the path of a source.
 class SearchResult {
  public:

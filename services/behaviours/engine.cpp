@@ -458,7 +458,7 @@ Executor::Main BehavioursEngine::run_loops(std::uint32_t i, const Executor& exec
   RobotThread& thread = executor.thread();
   KtRobot& robot = executor.robot();
   const KtExchange& exchange = *span.slot.exchange();
-  // What memory holds must be the state before the first call.
+  // Memory must hold the state before the first call.
   if (span.eventful)
     static_cast<void>(memory.copy_out(span.slot, executor.data_octets(), thread));
   else

@@ -28,7 +28,7 @@ class BehavioursState;
 
 namespace kilotwin::behaviours {
 
-/// What the station and the schedule say of tracked robots; needed where RunPlan::any_tracked().
+/// Inputs about tracked robots from the station and the schedule; needed where RunPlan::any_tracked().
 struct TrackedInputs {
   const TrackingFrame* frame = nullptr;
   std::span<const MembershipChange> memberships{};  ///< that take effect in the step, in order

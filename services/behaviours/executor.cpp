@@ -169,7 +169,7 @@ bool is_code(std::uint64_t address, const Program& program, const Slot& slot) {
   return !program.file.function_at(address - slot.image_address()).empty();
 }
 
-/// What is known of a jump out of the program; empty: the fault is none.
+/// A description of a jump out of the program; empty: the fault is none.
 std::string describe_jump(const Fault& fault, const Program& program, const Slot& slot) {
   char address[32];
   constexpr std::uint8_t kReturn = 0xc3;

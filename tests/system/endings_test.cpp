@@ -8,6 +8,7 @@
 
 #include "clients/recorder/reader.hpp"
 #include "core/federation/topics.hpp"
+#include "tests/system/own_domain.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::test {
@@ -119,10 +120,10 @@ TEST_F(Endings, AnEndlessLoopFailsItsRobotAlone) {
 }
 
 TEST_F(Endings, AServiceStartedTwiceLeavesTheRunAlone) {
-  const std::string domain = std::to_string(dds::DomainClaim::any().domain());
-  Process process(long_run({"--domain", domain}), scratch.path());
+  const OwnDomain domain;
+  Process process(long_run({"--domain", domain.name}), scratch.path());
   ASSERT_TRUE(recorded(5));
-  const Outcome second = kilotwin({"service", "comm", "--run", scratch / "run", "--domain", domain}, scratch);
+  const Outcome second = kilotwin({"service", "comm", "--run", scratch / "run", "--domain", domain.name}, scratch);
   EXPECT_EQ(second.status, 2);
   EXPECT_NE(second.err.find("was started already"), std::string::npos) << second.err;
   EXPECT_TRUE(process.running());
@@ -132,9 +133,9 @@ TEST_F(Endings, AServiceStartedTwiceLeavesTheRunAlone) {
 }
 
 TEST_F(Endings, TheFirstSampleOfASecondProcessIsNotCounted) {
-  const std::uint32_t domain = dds::DomainClaim::any().domain();
-  Process process(long_run({"--domain", std::to_string(domain)}), scratch.path());
-  const dds::Participant participant({domain, {}});
+  const OwnDomain domain;
+  const dds::Participant& participant = domain.participant;
+  Process process(long_run({"--domain", domain.name}), scratch.path());
   std::atomic<std::uint64_t> run{0};
   std::atomic<std::int64_t> tick{0};
   const dds::Reader<PublicRunStatus> status(participant, topics::run_status(),
@@ -266,12 +267,12 @@ TEST_F(Endings, AServiceThatMeetsNobodyGivesUpWhereItIsTold) {
   ASSERT_EQ(kilotwin({"run", source("experiments/disperse.txtpb"), "--prepare", "--out", scratch / "run"}, scratch)
                 .status,
             0);
-  const std::string domain = std::to_string(dds::DomainClaim::any().domain());
-  const Outcome outcome =
-      kilotwin({"service", "comm", "--run", scratch / "run", "--domain", domain, "--give-up-after", "1"}, scratch);
+  const OwnDomain domain;
+  const Outcome outcome = kilotwin(
+      {"service", "comm", "--run", scratch / "run", "--domain", domain.name, "--give-up-after", "1"}, scratch);
   EXPECT_EQ(outcome.status, 1);
   EXPECT_NE(outcome.err.find("radio gave up after it had waited"), std::string::npos) << outcome.err;
-  EXPECT_NE(outcome.err.find("services were heard on DDS domain " + domain), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("services were heard on DDS domain " + domain.name), std::string::npos) << outcome.err;
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "core/dds/dds.hpp"
+#include "tests/system/own_domain.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::test {
@@ -57,12 +58,11 @@ TEST(Hashes, AreThoseOfServicesStartedByHand) {
   Words words = disperse({"--partitions", "2x1", "--hosts", "2", "--prepare", "--out", directory});
   words.insert(words.begin(), "run");
   ASSERT_EQ(kilotwin(words, scratch).status, 0);
-  // A free domain: a claim of this test has found it and has ended.
-  const std::string domain = std::to_string(dds::DomainClaim::any().domain());
+  const OwnDomain domain;
   const auto service = [&](Words more) {
     Words all{program(), "service"};
     all.insert(all.end(), more.begin(), more.end());
-    all.insert(all.end(), {"--run", directory, "--domain", domain});
+    all.insert(all.end(), {"--run", directory, "--domain", domain.name});
     return std::make_unique<Process>(all, scratch.path());
   };
   std::vector<std::unique_ptr<Process>> services;

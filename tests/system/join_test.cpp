@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "core/dds/dds.hpp"
+#include "tests/system/own_domain.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::test {
@@ -15,21 +16,20 @@ namespace fs = std::filesystem;
 class Join : public testing::Test {
  protected:
   /// The example with the configuration that `kilotwin config` prints.
-  Words example(const std::string& domain) const {
+  Words example() const {
     const Outcome config = kilotwin({"config"}, scratch);
     EXPECT_EQ(config.status, 0) << config.err;
-    return {"/usr/bin/env", "CYCLONEDDS_URI=" + config.out, KILOTWIN_JOIN_EXAMPLE, domain};
+    return {"/usr/bin/env", "CYCLONEDDS_URI=" + config.out, KILOTWIN_JOIN_EXAMPLE, domain.name};
   }
-  static std::string free_domain() { return std::to_string(dds::DomainClaim::any().domain()); }
   Scratch scratch;
+  const OwnDomain domain;
 };
 
 TEST_F(Join, TheExampleFindsARunAndStopsIt) {
-  const std::string domain = free_domain();
   Process run({program(), "run", source("experiments/disperse.txtpb"), "--robots", "9", "--partitions", "1x1",
-               "--duration", "3600", "--pace", "1", "--domain", domain, "--out", scratch / "run"},
+               "--duration", "3600", "--pace", "1", "--domain", domain.name, "--out", scratch / "run"},
               scratch.path());
-  Process joined(example(domain), scratch.path());
+  Process joined(example(), scratch.path());
   const Outcome outcome = joined.wait();
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_NE(outcome.out.find("disperse is at tick"), std::string::npos) << outcome.out;
@@ -39,7 +39,7 @@ TEST_F(Join, TheExampleFindsARunAndStopsIt) {
 }
 
 TEST_F(Join, TheExampleSaysThatItFindsNoRun) {
-  Process joined(example(free_domain()), scratch.path());
+  Process joined(example(), scratch.path());
   EXPECT_TRUE(joined.says("no run found on domain", 30)) << "it waits 3 s";
   EXPECT_TRUE(joined.running()) << "a run may start later";
 }

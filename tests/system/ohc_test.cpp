@@ -18,6 +18,7 @@
 #include "clients/ohc/serial_port.hpp"
 #include "clients/recorder/reader.hpp"
 #include "core/federation/topics.hpp"
+#include "tests/system/own_domain.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::test {
@@ -27,10 +28,8 @@ namespace fs = std::filesystem;
 
 class Ohc : public testing::Test {
  protected:
-  Ohc() : domain_(dds::DomainClaim::any().domain()) {}
-
   std::unique_ptr<Process> start_ohc(const Words& where) {
-    Words words{program(), "ohc", "--domain", std::to_string(domain_)};
+    Words words{program(), "ohc", "--domain", domain_.name};
     words.insert(words.end(), where.begin(), where.end());
     return std::make_unique<Process>(words, ohc_scratch_.path());
   }
@@ -46,7 +45,7 @@ class Ohc : public testing::Test {
                 "1",
                 "--quiet",
                 "--domain",
-                std::to_string(domain_),
+                domain_.name,
                 "--out",
                 scratch_ / "run"};
     words.insert(words.end(), more.begin(), more.end());
@@ -65,7 +64,7 @@ class Ohc : public testing::Test {
   }
 
   Scratch scratch_, ohc_scratch_;
-  const std::uint32_t domain_;
+  const OwnDomain domain_;
 };
 
 constexpr std::uint8_t kWakeup = 0x85, kReadUid = 0x89;
@@ -106,7 +105,7 @@ TEST_F(Ohc, AStationProgramCommandsTheRobotsOfARun) {
       90));
   // While it sends a page, it is deaf.
   std::atomic<bool> hears_again{false};
-  const dds::Participant participant({domain_, {}});
+  const dds::Participant& participant = domain_.participant;
   const dds::Reader<PublicOverheadPacket> packets(participant, topics::overhead_packets(),
                                                   [&](const PublicOverheadPacket& packet, dds::SampleState state) {
                                                     if (state.valid && packet.message[9] == kReadUid)
@@ -141,7 +140,7 @@ TEST_F(Ohc, TheLinkGoesWithAKilledController) {
   auto ohc = start_ohc({"--pty", link.string()});
   ASSERT_TRUE(ohc->says("virtual overhead controller", 30));
   EXPECT_TRUE(fs::is_symlink(link));
-  const Outcome second = kilotwin({"ohc", "--pty", link.string(), "--domain", std::to_string(domain_)}, scratch_);
+  const Outcome second = kilotwin({"ohc", "--pty", link.string(), "--domain", domain_.name}, scratch_);
   EXPECT_EQ(second.status, 2);
   EXPECT_NE(second.err.find("exists"), std::string::npos) << second.err;
   EXPECT_TRUE(fs::is_symlink(link));
@@ -217,7 +216,7 @@ TEST_F(Ohc, APhysicalControllerDoesAsTheStationDoesAndStopsAtEveryEnding) {
     const auto run = start_run({"--force"});
     EXPECT_TRUE(controller.gets(kRunPacket)) << "the station starts the robots";
     EXPECT_TRUE(controller.gets(kStopPacket)) << "and frees the air";
-    dds::Participant participant({domain_, {}});
+    const dds::Participant& participant = domain_.participant;
     dds::Writer<PublicOverheadPacket> packets(participant, topics::overhead_packets());
     ASSERT_TRUE(eventually([&] { return packets.readers() > 0; }));
     PublicOverheadPacket page{};
@@ -257,7 +256,7 @@ TEST_F(Ohc, APhysicalControllerStopsWhenTheStationIsKilled) {
   const auto run = start_run();
   ASSERT_TRUE(controller.gets(kStopPacket)) << "after RUN";
   ASSERT_TRUE(ohc->says("run disperse", 30));
-  dds::Participant participant({domain_, {}});
+  const dds::Participant& participant = domain_.participant;
   dds::Writer<PublicOverheadPacket> packets(participant, topics::overhead_packets());
   ASSERT_TRUE(eventually([&] { return packets.readers() > 0; }));
   PublicOverheadPacket wakeup{};
@@ -293,16 +292,16 @@ TEST_F(Ohc, AStationShowsThatItLivesWhileAPluginComputes) {
                                      "\" layout { grid { } } } station { environment { plugin { source: "
                                      "\"slow.cpp\" } } }");
   std::atomic<int> statuses{0};
-  const dds::Participant participant({domain_, {}});
+  const dds::Participant& participant = domain_.participant;
   const dds::Reader<PublicRunStatus> reader(participant, topics::run_status(),
                                             [&](const PublicRunStatus& status, dds::SampleState state) {
                                               const std::string_view note = status.note;
                                               if (state.valid && note.find("plugin slow.cpp") != note.npos)
                                                 ++statuses;
                                             });
-  Process run({program(), "run", scratch_ / "slow.txtpb", "--quiet", "--domain", std::to_string(domain_), "--out",
-               scratch_ / "run"},
-              scratch_.path());
+  Process run(
+      {program(), "run", scratch_ / "slow.txtpb", "--quiet", "--domain", domain_.name, "--out", scratch_ / "run"},
+      scratch_.path());
   ASSERT_TRUE(eventually([&] { return statuses >= 1; }, 120));
   EXPECT_TRUE(eventually([&] { return statuses >= 5; }, 30)) << "the plugin is given up after 60 s";
   write(scratch_ / "go", "go");
@@ -320,8 +319,8 @@ TEST_F(Ohc, AStopIsPromptOnALineThatTheStationOverloads) {
   Controller controller;
   auto ohc = start_ohc({"--serial", controller.port()});
   ASSERT_TRUE(ohc->says("waiting for a run", 30));
-  Process run({program(), "run", scratch_ / "busy.txtpb", "--pace", "1", "--quiet", "--domain",
-               std::to_string(domain_), "--out", scratch_ / "run"},
+  Process run({program(), "run", scratch_ / "busy.txtpb", "--pace", "1", "--quiet", "--domain", domain_.name,
+               "--out", scratch_ / "run"},
               scratch_.path());
   const auto packets = [&] { return controller.counters().packets; };
   ASSERT_TRUE(eventually([&] { return controller.next() && packets() > 100; }, 60));

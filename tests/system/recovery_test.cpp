@@ -7,6 +7,7 @@
 
 #include "clients/recorder/reader.hpp"
 #include "core/federation/topics.hpp"
+#include "tests/system/own_domain.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::test {
@@ -149,13 +150,12 @@ TEST_F(Recoveries, ExternalInputIsRepeated) {
       << kKillHost << " } }\n"
       << "int main(void) { kilo_init(); kilo_message_rx = rx; kilo_start(setup, loop); }\n";
   for (const char* every : {"1000", "0.1"}) {
-    const std::string domain = std::to_string(dds::DomainClaim::any().domain()),
-                      name = "told-" + std::string(every);
-    const dds::Participant participant({static_cast<std::uint32_t>(std::stoul(domain)), {}});
-    dds::Writer<PublicOverheadPacket> overhead(participant, topics::overhead_packets());
+    const OwnDomain domain;
+    const std::string name = "told-" + std::string(every);
+    dds::Writer<PublicOverheadPacket> overhead(domain.participant, topics::overhead_packets());
     Process process({program(), "run", source("experiments/disperse.txtpb"), "--robots", "8", "--duration", "8",
-                     "--pace", "6", "--partitions", "1x1", "--domain", domain, "--behaviour", scratch / "told.c",
-                     "--checkpoint-every", every, "--out", scratch / name},
+                     "--pace", "6", "--partitions", "1x1", "--domain", domain.name, "--behaviour",
+                     scratch / "told.c", "--checkpoint-every", every, "--out", scratch / name},
                     scratch.path());
     ASSERT_TRUE(eventually([&] { return overhead.readers() > 0; }));
     PublicOverheadPacket packet{};

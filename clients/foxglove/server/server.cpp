@@ -61,7 +61,7 @@ struct Viewer {
   http::RequestAllowance allowance;
 };
 
-/// What libwebsockets keeps per connection, as zeroed memory.
+/// The data that libwebsockets keeps per connection, as zeroed memory.
 struct Session {
   Viewer* viewer;
 };

@@ -1,7 +1,7 @@
 /// Server of the Foxglove WebSocket protocol, version 1. Foxglove and Lichtblick connect to it: "Open connection",
 /// "Foxglove WebSocket". It speaks under the protocol's two names, foxglove.websocket.v1 and foxglove.sdk.v1.
 ///
-/// Viewers can only look. A slow one gets fewer messages: of each channel the newest that matter. What waits for it is bounded, and
+/// Viewers can only look. A slow one gets fewer messages: of each channel the newest that matter. Its queue is bounded, and
 /// no viewer delays write() or another viewer. One that breaks the rules is disconnected: a message that is too long or no JSON,
 /// too many subscriptions, or more than http::kMostRequestsPerSecond.
 ///

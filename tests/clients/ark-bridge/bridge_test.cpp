@@ -36,7 +36,7 @@ TEST(ArkBridge, SplitsAPacketIntoTheMessagesOfRealRobots) {
   EXPECT_EQ(std::get<ArkSignal>(orders[1]), (ArkSignal{8, 0, 512}));
 }
 
-/// Whatever a packet holds, its three messages come out as they went in.
+/// The three messages of any packet come out as they went in.
 TEST(ArkBridge, SplittingLosesNothing) {
   const Door d = door("name: 'ark' ark {}", 1023);
   Tally tally;

@@ -17,7 +17,7 @@
 namespace kilotwin::cameras {
 namespace {
 
-/// What ARK reads of a calibration file, and computes when it loads one. Its height adjustments are 0.
+/// The data that ARK reads of a calibration file, and computes when it loads one. Its height adjustments are 0.
 struct Calibration {
   std::array<cv::Point2f, 4> corner;
   std::vector<cv::Mat> R, K;

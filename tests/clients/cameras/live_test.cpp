@@ -14,6 +14,7 @@
 #include "core/dds/dds.hpp"
 #include "core/os/files.hpp"
 #include "idl/experiment.pb.h"
+#include "tests/system/own_domain.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::cameras {
@@ -62,12 +63,13 @@ class LiveCamerasTest : public testing::Test {
 };
 
 TEST_F(LiveCamerasTest, PicturesShowWhatWasRecordedAtTheirTick) {
-  const std::string domain = std::to_string(dds::DomainClaim::any().domain());
-  Process cameras({KILOTWIN_VISION, "cameras", "--domain", domain, "--one-run", "--picture", scratch / "arena.png",
-                   "--dir", scratch / "frames", "--mjpeg", "0", "--size", "640x480", "--quality", "95"},
-                  scratch.path());
+  const test::OwnDomain domain;
+  Process cameras(
+      {KILOTWIN_VISION, "cameras", "--domain", domain.name, "--one-run", "--picture", scratch / "arena.png",
+       "--dir", scratch / "frames", "--mjpeg", "0", "--size", "640x480", "--quality", "95"},
+      scratch.path());
   ASSERT_TRUE(cameras.says("four cameras for ARK", 60));
-  Process run({test::program(), "run", scratch / "filmed.txtpb", "--quiet", "--pace", "1", "--domain", domain,
+  Process run({test::program(), "run", scratch / "filmed.txtpb", "--quiet", "--pace", "1", "--domain", domain.name,
                "--out", scratch / "run"},
               scratch.path());
   // Reads the big picture whenever it changes, and ARK's files as ARK does.

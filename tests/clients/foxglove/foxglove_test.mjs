@@ -119,12 +119,12 @@ try {
   assert.ok(stamps.at(-1) < 100n * 1000000000n);
   assert.ok(first.times.length >= 5);
 
-  // Who comes late sees the arena too.
+  // A viewer that comes late sees the arena too.
   const late = viewer();
   await late.until("the arena", () => (late.messages["/scene"] ?? []).length >= 1 && (late.messages["/robots"] ?? []).length >= 2);
   assert.equal(late.messages["/scene"][0].decoded.entities[0].id, "arena");
 
-  // Who breaks the rules is disconnected, and nobody else.
+  // A viewer that breaks the rules is disconnected, and no other one.
   for (const text of ["no json", "[]", '{"op": 1}', '{"op": "subscribe"}', `{"op": "x", "y": "${"z".repeat(100000)}"}`]) {
     const bad = new WebSocket(url, ["foxglove.sdk.v1"]);
     await new Promise((open) => bad.on("open", open));

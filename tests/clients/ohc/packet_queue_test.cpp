@@ -1,4 +1,4 @@
-// What waits for the serial line: in order, none for long, and no page is lost.
+// The queue of the serial line: in order, none for long, and no page is lost.
 #include "clients/ohc/packet_queue.hpp"
 
 #include <gtest/gtest.h>

@@ -133,8 +133,8 @@ TEST(SerialPacket, NothingIsTakenForAPacketBeforeItHasCome) {
   EXPECT_FALSE(decoder.take(run[131]));
 }
 
-/// A million octets of noise, headers, and packets whole, cut, doubled, with octets changed, lost and put in between. What
-/// is found is what a reader finds that looks at every window anew, and a good packet after it all is taken.
+/// A million octets of noise, headers, and packets whole, cut, doubled, with octets changed, lost and put in between. The
+/// search finds the same packets as a reader that looks at every window anew, and a good packet after it all is taken.
 TEST(SerialPacketFuzz, AMillionOctets) {
   std::mt19937 random(4);
   std::vector<std::uint8_t> octets;

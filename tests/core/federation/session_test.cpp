@@ -190,6 +190,16 @@ class Sessions : public ::testing::Test {
   void start_all() {
     for (std::uint32_t i = 0; i < plan_.federates(); ++i) start(FederateId{i});
   }
+  /// Starts the host once the station, which runs with all others, has said that it waits for the host.
+  void start_host_when_awaited() {
+    of(plan_.station()).on_idle = [&](Session& session) {
+      if (session.waiting_for().find("behaviours 1/1 to arrive") != std::string::npos) awaited_ = true;
+    };
+    for (std::uint32_t i = 0; i < host_.value(); ++i) start(FederateId{i});
+    for (int i = 0; i < 3000 && !awaited_; ++i) std::this_thread::sleep_for(10ms);
+    EXPECT_TRUE(awaited_);
+    start(host_);
+  }
   void join() {
     for (std::thread& thread : threads_) thread.join();
     threads_.clear();
@@ -243,6 +253,7 @@ class Sessions : public ::testing::Test {
   double give_up_after_s_ = 0;
   std::array<Hooks, 4> hooks_;
   std::array<Outcome, 4> outcomes_;
+  std::atomic<bool> awaited_{false};  ///< the station has said that it waits for the host
   std::vector<std::thread> threads_;
 };
 
@@ -318,19 +329,12 @@ TEST_F(Sessions, TakeDirectivesOfTheLastTicks) {
 
 TEST_F(Sessions, TakeDirectivesThatAFederateWasTooLateToHear) {
   std::optional<Director> director;
-  std::atomic<bool> waits{false};
-  of(plan_.station()).on_idle = [&](Session& session) {
-    if (session.waiting_for().find("behaviours 1/1 to arrive") != std::string::npos) waits = true;
-  };
   of(plan_.station()).on_publish = [&](Session& session) {
     if (session.now() != Tick{0}) return;
     director.emplace(session);
     for (std::uint8_t octet = 1; octet <= 3; ++octet) director->announce(DirectiveKind::kOverheadInput, 0, octet);
   };
-  for (std::uint32_t i = 0; i < host_.value(); ++i) start(FederateId{i});
-  for (int i = 0; i < 3000 && !waits; ++i) std::this_thread::sleep_for(10ms);
-  EXPECT_TRUE(waits);
-  start(host_);
+  start_host_when_awaited();
   join();
   expect_all_end_at(kLast);
   for (const Outcome& outcome : outcomes_) EXPECT_EQ(outcome.inputs, "1 at 4; 2 at 4; 3 at 4; ");
@@ -442,14 +446,7 @@ TEST_F(Sessions, DecodeFramesWithoutTheirMutex) {
 }
 
 TEST_F(Sessions, PrintTheFederatesThatTheyWaitFor) {
-  std::atomic<bool> said{false};
-  of(plan_.station()).on_idle = [&](Session& session) {
-    if (session.waiting_for().find("behaviours 1/1 to arrive") != std::string::npos) said = true;
-  };
-  for (std::uint32_t i = 0; i < host_.value(); ++i) start(FederateId{i});
-  for (int i = 0; i < 3000 && !said; ++i) std::this_thread::sleep_for(10ms);
-  EXPECT_TRUE(said);
-  start(host_);
+  start_host_when_awaited();
   join();
   expect_all_end_at(kLast);
 }

@@ -1,4 +1,4 @@
-// What compilers keep in the cache, and what makes them look again: sources around a program, folders, firmware.
+// The content of the compilers' cache, and what makes them look again: sources around a program, folders, firmware.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -271,7 +271,7 @@ TEST(Engine, HostsOnThreadsEqualOneHost) {
   }
 }
 
-/// Ticks end anywhere in these calls. What the host knows of a tick's duties is not part of a robot's memory.
+/// Ticks end anywhere in these calls. The host's duties of a tick are not part of a robot's memory.
 TEST(Engine, ManyChangesOfMotorsInATickDoNotDependOnTheHosts) {
   const std::string source = program(
       "static void loop(void) { set_motors(70 + (rand_soft() & 1), kilo_uid);\n"

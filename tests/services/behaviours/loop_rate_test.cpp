@@ -161,7 +161,7 @@ TEST(LoopRate, PrintedTextIsNotSkipped) {
   EXPECT_GE(octets, 20u);
 }
 
-/// What a swarm of two robots with this loop() is warned of within ten seconds.
+/// The warnings for a swarm of two robots with this loop() within ten seconds.
 std::vector<std::string> warned(const std::string& loop, bool as_on_robot) {
   Swarm swarm({program("static uint32_t n;\nstatic void loop(void) { " + loop + " }\n")}, 2, 1, "",
               [&](proto::Manifest& manifest) {

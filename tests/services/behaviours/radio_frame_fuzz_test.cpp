@@ -20,7 +20,7 @@ const char* const kListener =
     "static void rx(message_t* got, distance_measurement_t* d) { heard += got->data[0] + estimate_distance(d); }"
     "static void loop(void) { set_color(RGB(heard & 3, 0, 0)); }";
 
-/// What a radio may send: everyone is asked, two messages reach three robots.
+/// A frame that a radio may send: everyone is asked, two messages reach three robots.
 Air busy_air() {
   Air air;
   air.ask = {0, 1, 2, 3};

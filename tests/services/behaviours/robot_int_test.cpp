@@ -62,7 +62,7 @@ TEST(RobotInt, UnsignedHas16BitsAndLong32) {
                     "sizeof a == 4 && sizeof b == 8 && b > 0x7fffffffL && d == 1.5 && sizeof(unsigned) == 2"));
   EXPECT_TRUE(holds("struct { unsigned long state, other; } r = {1, 7}; rand_r(&r.state); random_r(&r.state);",
                     "r.other == 7 && r.state != 1"));
-  // What goes into a message or the EEPROM has the robot's layout.
+  // Data of a message or the EEPROM have the robot's layout.
   EXPECT_TRUE(holds("struct { unsigned id; long seen; unsigned int near : 1; uint8_t last; } s;", "sizeof s == 8"));
   EXPECT_TRUE(
       holds("char t[20]; long a = -70000; unsigned long b = 70000; unsigned c = 7;"

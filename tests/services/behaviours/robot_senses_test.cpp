@@ -23,7 +23,7 @@ std::int32_t value_of(const IrMessage& m) {
                                    static_cast<std::uint32_t>(m[2]) << 16 | static_cast<std::uint32_t>(m[3]) << 24);
 }
 
-/// What each robot reports now.
+/// The values that each robot reports now.
 std::vector<std::int32_t> values(Swarm& swarm) {
   Air ask;
   for (std::uint32_t robot = 0; robot < swarm.plan->robots(); ++robot) ask.ask.push_back(robot);

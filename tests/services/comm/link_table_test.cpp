@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <map>
 #include <string>
 
@@ -104,9 +105,12 @@ TEST(Notice, ClocksRunFromPowerOn) {
 
 /// Real receivers' largest distance estimates in a static group are 110..113 mm (data/radio-log): farther robots are not
 /// received. Beyond their tables, estimates continue with the slope of the last step.
-TEST(CutOff, IsCloseToThatOfRealReceivers) {
+struct Estimates {
+  double mean_mm, spread_mm;
+};
+Estimates largest_estimates(const std::string& range) {
   constexpr std::uint32_t kListeners = 1000;
-  const RunPlan plan = make_plan("radio { model: PROPAGATION propagation { sensitivity_sd_db: 0.5 } }",
+  const RunPlan plan = make_plan("radio { model: PROPAGATION " + range + " propagation { sensitivity_sd_db: 0.5 } }",
                                  testing::grid_crowd(kListeners, 300, testing::Facing::kRight));
   const LinkBudget links(plan);
   const RadioParameters parameters(plan);
@@ -116,16 +120,31 @@ TEST(CutOff, IsCloseToThatOfRealReceivers) {
     const RangingTable table = parameters.table(i);
     std::size_t n = 0;
     while (n + 1 < table.high.size() && reading <= table.high[n]) ++n;
-    ASSERT_GT(n, 0u);
+    EXPECT_GT(n, 0u);
+    if (n == 0) continue;
     const double step = static_cast<double>(table.high[n]) - table.high[n - 1];
     const double distance_mm =
         KILOTWIN_IR_CONTACT_MM + KILOTWIN_IR_STEP_MM * (static_cast<double>(n) + (reading - table.high[n]) / step);
     sum += distance_mm;
     squares += distance_mm * distance_mm;
   }
-  const double mean = sum / kListeners;
-  EXPECT_NEAR(mean, 112, 5);
-  EXPECT_NEAR(std::sqrt(squares / kListeners - mean * mean), 1.3, 0.4);
+  const double mean_mm = sum / kListeners;
+  return {mean_mm, std::sqrt(squares / kListeners - mean_mm * mean_mm)};
+}
+
+TEST(CutOff, IsCloseToThatOfRealReceivers) {
+  const Estimates by_default = largest_estimates("");
+  EXPECT_NEAR(by_default.mean_mm, 112, 5);
+  EXPECT_NEAR(by_default.spread_mm, 1.3, 0.4);
+  // For docs/results/radio.md, beside the ranges that fit the measured grids.
+  std::printf("largest estimate, default range: mean %.1f mm, spread %.1f mm\n", by_default.mean_mm,
+              by_default.spread_mm);
+  for (const char* const range_mm : {"139", "145"}) {
+    const Estimates fitted = largest_estimates(std::string("range_mm: ") + range_mm);
+    std::printf("largest estimate, range %s mm: mean %.1f mm, spread %.1f mm\n", range_mm, fitted.mean_mm,
+                fitted.spread_mm);
+    EXPECT_GT(fitted.mean_mm, by_default.mean_mm);
+  }
 }
 
 }  // namespace
