@@ -53,8 +53,8 @@ struct Robot {
 };
 
 struct Tally {
-  double robot_s = 0, close_pair_s = 0, missed_s = 0, square_mm = 0, cpu_s = 0;
-  long sightings = 0, losses = 0, swaps = 0, leds = 0, led_wrong = 0, frames = 0;
+  double robot_s = 0, close_pair_s = 0, missed_s = 0, square_mm = 0, heading_rad = 0, cpu_s = 0;
+  long sightings = 0, headings = 0, losses = 0, swaps = 0, leds = 0, led_wrong = 0, frames = 0;
 };
 
 class Judge {
@@ -92,6 +92,10 @@ class Judge {
     if (mine == nullptr) return;
     ++tally.sightings;
     tally.square_mm += off_mm * off_mm;
+    if (const auto heading = mine->heading_filter.heading()) {
+      tally.heading_rad += std::abs(wrapped(heading->heading_rad - truth.pose.heading_rad));
+      ++tally.headings;
+    }
     ++tally.leds;
     tally.led_wrong += track::bits_of(*mine->led_read) != truth.led ? 1 : 0;
     const bool was_anothers = std::any_of(robots_.begin(), robots_.end(), [&](const Robot& other) {
@@ -116,9 +120,13 @@ void print(const Tally& t) {
   std::printf("| frames, robot-hours | | %ld, %.2f |\n", t.frames, hours);
   std::printf("| position, root mean square along one axis, mm | `position_noise_mm` | %.3f |\n",
               std::sqrt(t.square_mm / static_cast<double>(2 * std::max(1L, t.sightings))));
+  std::printf("| heading, mean absolute error, degrees | from motion, LED and body | %.2f |\n",
+              180 / kPi * t.heading_rad / static_cast<double>(std::max(1L, t.headings)));
   std::printf("| class of a LED wrong in one picture | `led_error` | %.5f |\n",
               static_cast<double>(t.led_wrong) / static_cast<double>(std::max(1L, t.leds)));
-  std::printf("| losses per robot and hour | `losses_per_hour` | %.2f |\n", static_cast<double>(t.losses) / hours);
+  // The standard errors of rates are those of Poisson counts.
+  std::printf("| losses per robot and hour | `losses_per_hour` | %.2f +- %.2f |\n",
+              static_cast<double>(t.losses) / hours, std::sqrt(static_cast<double>(t.losses)) / hours);
   std::printf("| mean length of a loss, s | `lost_s` | %.2f |\n",
               t.losses == 0 ? 0 : t.missed_s / static_cast<double>(t.losses));
   std::printf("| exchanges per hour of a pair closer than 40 mm (%.2f h) | `swaps_per_hour` | %.2f |\n", pair_hours,

@@ -155,7 +155,7 @@ void HeadingFilter::predict_turned(Hypothesis& h, double dt_s) {
 
 void HeadingFilter::predict(double dt_s) {
   for (std::size_t i = 0; i < kModes; ++i) {
-    // A hypothesis that is out of the question is made anew by mix(). Until then its errors would grow beyond any bound.
+    // A hypothesis without weight is made anew by mix() before it counts again.
     if (weights_[i] == 0) continue;
     Hypothesis& h = hypotheses_[i];
     if (i == kHeld) {

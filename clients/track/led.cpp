@@ -5,136 +5,33 @@
 #include <cmath>
 #include <iterator>
 
-#include "core/stats/quantiles.hpp"
+#include "clients/track/led_light.hpp"
+#include "clients/track/led_sources.hpp"
 
 namespace kilotwin::track {
 namespace {
 
-constexpr double kOuter = 1.35;                      ///< the spot's light reaches that far from the centre, radii
-constexpr double kFloorFrom = 1.35, kFloorTo = 1.8;  ///< the ring in which the floor is seen, radii
-constexpr double kGridRadius = 8;  ///< larger discs are looked at with every second pixel, or fewer
-constexpr double kSpot = 0.32;     ///< radius of the window that a spot fills, radii
-/// Excess over the floor and difference of the channels, relative to the floor, above which a pixel is lit.
-constexpr double kLeastExcess = 0.15, kLeastChroma = 0.16;
-/// The dark rim, radii, and the brightness relative to the floor above which it is lit.
-constexpr double kRimFrom = 0.72, kRimTo = 0.95, kBrightRim = 0.8;
+constexpr double kOuter = 1.35;  ///< the spot's light reaches that far from the centre, radii
+constexpr double kSpot = 0.32;   ///< radius of the window that a spot fills, radii
 /// Sum of what is above these, relative to the area of a window, above which there is a spot.
 constexpr double kLeastLight = 0.10;
 /// A second channel with this share of the strongest one belongs to the colour.
 constexpr double kMixed = 0.5;
+/// A source whose colour has less than this share of its white light is white: its white light hides the colours of others.
+constexpr double kHuelessSource = 0.6;
+/// Of a source without a hue, those pixels count that are at least so many times closer to it than to any other source.
+constexpr double kClaimed = 2;
+/// Robots farther away than this, radii, matter to no pixel.
+constexpr double kFarthestLight = 4.4;
 /// No class is clear if the centre of another robot is nearer than this, radii: its light may be taken for this robot's.
 constexpr double kAlone = 3.0;
 /// A class is clear below this share of the second channel; and above, or below, these multiples of the least light.
 constexpr double kPure = 0.3, kClearlyLit = 2, kClearlyDark = 0.5;
 /// Where even the weakest one has this share, the light is white.
 constexpr double kGrey = 0.7;
-/// The floor is looked at no farther from the centre than this, radii, and places so close to another robot's centre are no floor.
-constexpr double kFarthestFloor = 3.0, kCovered = 1.25;
 /// Light that rises across the border to another robot, to more than this multiple, is the other's. So many windows are looked at.
 constexpr double kSpill = 1.5;
 constexpr int kClimb = 8, kTries = 3;
-constexpr double kClipped = 246;  ///< grey level above which a pixel counts as saturated
-
-using Colour = std::array<double, 3>;  // red, green, blue
-
-Colour pixel(const cv::Mat& picture, int row, int column) {
-  if (picture.channels() == 1) {
-    const double v = picture.at<unsigned char>(row, column);
-    return {v, v, v};
-  }
-  const auto& p = picture.at<cv::Vec3b>(row, column);
-  return {static_cast<double>(p[2]), static_cast<double>(p[1]), static_cast<double>(p[0])};
-}
-
-double distance(double x, double y, const Circle& c) {
-  const double dx = x - c.centre.x_px, dy = y - c.centre.y_px;
-  return std::sqrt(dx * dx + dy * dy);
-}
-
-/// The floor's colour around a robot: the median of each channel, of places that no robot covers.
-Colour floor_around(const cv::Mat& picture, const Circle& disc, const std::vector<Circle>& others) {
-  std::array<std::vector<double>, 3> seen;
-  const double r = disc.radius_px;
-  constexpr int kAngles = 72, kRadii = 3;
-  for (int pass = 0; pass < 2 && seen[0].size() < kAngles / 4; ++pass) {
-    const double from = pass == 0 ? kFloorFrom : kFloorTo, to = pass == 0 ? kFloorTo : kFarthestFloor;
-    for (int i = 0; i < kAngles * kRadii; ++i) {
-      const double at = r * (from + (to - from) * (i % kRadii) / (kRadii - 1));
-      const double angle = 2 * CV_PI * (i / kRadii) / kAngles;
-      const double x = disc.centre.x_px + at * std::cos(angle), y = disc.centre.y_px + at * std::sin(angle);
-      const int column = cvRound(x), row = cvRound(y);
-      if (column < 0 || row < 0 || column >= picture.cols || row >= picture.rows) continue;
-      if (std::any_of(others.begin(), others.end(),
-                      [&](const Circle& o) { return distance(x, y, o) < kCovered * o.radius_px; }))
-        continue;
-      const Colour c = pixel(picture, row, column);
-      for (std::size_t k = 0; k < 3; ++k) seen[k].push_back(c[k]);
-    }
-  }
-  Colour floor{};
-  for (std::size_t k = 0; k < 3; ++k) {
-    // Crowded: the brightest of what there is was hardly a robot.
-    if (seen[k].empty()) return {160, 160, 160};
-    floor[k] = std::max(12.0, stats::upper_median(std::move(seen[k])));
-  }
-  return floor;
-}
-
-/// The light of one robot's surroundings, relative to the floor: a grid of some 20 x 20 pixels.
-struct Light {
-  int left, top, stride, columns, rows;
-  std::vector<Colour> relative;  ///< pixel / floor
-  std::vector<double> weight;    ///< how much of the pixel is light of an LED; 0 where another robot is nearer
-  std::vector<double> anyones;   ///< the same whoever is nearer
-  std::vector<bool> clipped;     ///< the camera is saturated: there is no colour
-
-  [[nodiscard]] std::size_t index(int column, int row) const {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(column);
-  }
-};
-
-Light light_around(const cv::Mat& picture, const Circle& disc, const std::vector<Circle>& others) {
-  const Colour floor = floor_around(picture, disc, others);
-  const double reach = kOuter * disc.radius_px;
-  const int left = std::max(0, cvFloor(disc.centre.x_px - reach));
-  const int top = std::max(0, cvFloor(disc.centre.y_px - reach));
-  const int right = std::min(picture.cols - 1, cvCeil(disc.centre.x_px + reach));
-  const int bottom = std::min(picture.rows - 1, cvCeil(disc.centre.y_px + reach));
-  const int stride = std::max(1, cvRound(disc.radius_px / kGridRadius));
-  Light light{
-      left, top, stride, std::max(0, (right - left) / stride + 1), std::max(0, (bottom - top) / stride + 1), {},
-      {},   {},  {}};
-  const auto count = static_cast<std::size_t>(light.columns) * static_cast<std::size_t>(light.rows);
-  light.relative.assign(count, Colour{});
-  light.weight.assign(count, 0);
-  light.anyones.assign(count, 0);
-  light.clipped.assign(count, false);
-  std::size_t i = 0;
-  for (int y = 0; y < light.rows; ++y) {
-    for (int x = 0; x < light.columns; ++x, ++i) {
-      const int row = top + y * stride, column = left + x * stride;
-      const double own = distance(column, row, disc) / disc.radius_px;
-      if (own > kOuter) continue;
-      double nearest = own;  // distance from the middle of the robot that is nearest, radii
-      for (const Circle& other : others)
-        nearest = std::min(nearest, distance(column, row, other) / other.radius_px);
-      Colour& c = light.relative[i];
-      c = pixel(picture, row, column);
-      light.clipped[i] = std::min({c[0], c[1], c[2]}) >= kClipped;
-      for (std::size_t k = 0; k < 3; ++k) c[k] /= floor[k];
-      const auto [least, most] = std::minmax({c[0], c[1], c[2]});
-      // A body reflects less than the floor: its tint counts little. In its middle, a dome may mirror a lamp.
-      const double tint =
-          light.clipped[i] ? 0 : std::max(0.0, (most - least) - kLeastChroma) * std::min(1.0, most / 0.5);
-      double excess = nearest > 0.45 ? std::max(0.0, most - 1 - kLeastExcess) : 0;
-      // The rim is dark: what is as bright as the floor there is light.
-      if (nearest > kRimFrom && nearest < kRimTo) excess = std::max(excess, 2 * (most - kBrightRim));
-      light.anyones[i] = std::max(tint, excess);
-      light.weight[i] = nearest < own ? 0 : light.anyones[i];
-    }
-  }
-  return light;
-}
 
 struct Spot {
   double x = 0, y = 0;  ///< columns and rows of the grid
@@ -230,6 +127,21 @@ struct Hue {
   bool pure = false;  ///< one channel alone
 };
 
+/// The class of summed light: of pixels with a colour, less their dimmest channel, and of pixels without one.
+Hue hue_of(Colour pure, double white) {
+  const auto [dimmest, strongest] = std::minmax({pure[0], pure[1], pure[2]});
+  if (strongest <= 0 || strongest < 0.35 * white || dimmest > kGrey * strongest) return {};
+  // The saturated middle leaves white in the sum.
+  for (double& channel : pure) channel -= dimmest;
+  const double most = strongest - dimmest;
+  const bool red = pure[0] > kMixed * most, green = pure[1] > kMixed * most, blue = pure[2] > kMixed * most;
+  if (red && green) return {Led::kYellow};
+  if (red && blue) return {Led::kMagenta};
+  if (green && blue) return {Led::kCyan};
+  const double second = pure[0] + pure[1] + pure[2] - most;  // the weakest is 0
+  return {red ? Led::kRed : green ? Led::kGreen : Led::kBlue, second < kPure * most};
+}
+
 Hue classify(const Light& light, const Circle& disc, const Spot& spot) {
   // The colour is in the glow, at most two windows wide, and counts where the channels differ.
   const double reach = 2 * std::max(1.2, kSpot * disc.radius_px);
@@ -250,17 +162,64 @@ Hue classify(const Light& light, const Circle& disc, const Spot& spot) {
       }
     }
   }
-  const auto [dimmest, strongest] = std::minmax({pure[0], pure[1], pure[2]});
-  if (strongest <= 0 || strongest < 0.35 * white || dimmest > kGrey * strongest) return {};
-  // The saturated middle leaves white in the sum.
-  for (double& channel : pure) channel -= dimmest;
-  const double most = strongest - dimmest;
-  const bool red = pure[0] > kMixed * most, green = pure[1] > kMixed * most, blue = pure[2] > kMixed * most;
-  if (red && green) return {Led::kYellow};
-  if (red && blue) return {Led::kMagenta};
-  if (green && blue) return {Led::kCyan};
-  const double second = pure[0] + pure[1] + pure[2] - most;  // the weakest is 0
-  return {red ? Led::kRed : green ? Led::kGreen : Led::kBlue, second < kPure * most};
+  return hue_of(pure, white);
+}
+
+/// The reading of a robot that shares no light with others. `alone`: no other robot's light can be taken for its own.
+LedReading reading_alone(Light light, const Circle& disc, bool alone) {
+  if (light.weight.empty()) return {};
+  Spot spot = brightest(light, disc);
+  for (int tries = 0; tries < kTries && spot.strength >= kLeastLight && is_spilled(light, disc, spot); ++tries) {
+    remove(light, disc, spot);
+    spot = brightest(light, disc);
+  }
+  LedReading reading;
+  reading.strength = spot.strength;
+  if (spot.strength < kLeastLight) {
+    reading.clear = alone && spot.strength < kClearlyDark * kLeastLight;
+    return reading;
+  }
+  const Hue hue = classify(light, disc, spot);
+  reading.led = hue.led;
+  reading.clear = alone && hue.pure && spot.strength > kClearlyLit * kLeastLight;
+  const double dx = light.left + spot.x * light.stride - disc.centre.x_px,
+               dy = light.top + spot.y * light.stride - disc.centre.y_px;
+  if (std::hypot(dx, dy) > 0.4 * disc.radius_px) reading.bearing_rad = std::atan2(-dy, dx);
+  return reading;
+}
+
+/// Leaves the light of those pixels alone that are nearest to the own source.
+void claim(Light& light, const LedSource& source) {
+  for (int row = 0; row < light.rows; ++row) {
+    for (int column = 0; column < light.columns; ++column) {
+      const Point at = light.pixel(column, row);
+      const double own_px = distance_px(at, source.at);
+      const bool others = std::any_of(source.others.begin(), source.others.end(), [&](const Point& other) {
+        return distance_px(at, other) < kClaimed * own_px;
+      });
+      const std::size_t i = light.index(column, row);
+      light.weight[i] = others ? 0 : light.anyones[i];
+    }
+  }
+}
+
+/// The reading of a robot whose light others share.
+LedReading reading_shared(Light light, const Circle& disc, const std::vector<Circle>& near) {
+  const std::optional<LedSource> source = own_source(light, disc, near);
+  if (!source) return {};
+  const double strongest = std::max({source->colour[0], source->colour[1], source->colour[2]});
+  LedReading reading;
+  reading.strength = std::max(strongest, source->white);
+  reading.bearing_rad = std::atan2(disc.centre.y_px - source->at.y_px, source->at.x_px - disc.centre.x_px);
+  if (strongest >= kHuelessSource * source->white) {
+    reading.led = hue_of(source->colour, 0).led;
+  } else {
+    // A saturated LED shows its colour in the glow alone.
+    claim(light, *source);
+    const Spot spot{(source->at.x_px - light.left) / light.stride, (source->at.y_px - light.top) / light.stride, 0};
+    reading.led = classify(light, disc, spot).led;
+  }
+  return reading;
 }
 
 }  // namespace
@@ -288,35 +247,16 @@ std::uint8_t bits_of(Led led) {
 
 LedReading read_led(const cv::Mat& picture, const Circle& disc, const std::vector<Circle>& all_others) {
   // Those further away cover no pixel that is looked at, and are nearest to none.
-  static_assert(kCovered <= kOuter && kOuter <= kFarthestFloor);
-  std::vector<Circle> others;
-  std::copy_if(all_others.begin(), all_others.end(), std::back_inserter(others), [&](const Circle& other) {
-    return distance(other.centre.x_px, other.centre.y_px, disc) <
-           kFarthestFloor * disc.radius_px + kOuter * other.radius_px;
-  });
-  Light light = light_around(picture, disc, others);
-  if (light.weight.empty()) return {};
-  Spot spot = brightest(light, disc);
-  for (int tries = 0; tries < kTries && spot.strength >= kLeastLight && is_spilled(light, disc, spot); ++tries) {
-    remove(light, disc, spot);
-    spot = brightest(light, disc);
+  std::vector<Circle> others, near;
+  bool alone = true;
+  for (const Circle& other : all_others) {
+    const double apart = distance_px(other.centre.x_px, other.centre.y_px, disc) / disc.radius_px;
+    if (apart < kFarthestLight) others.push_back(other);
+    if (apart < kSharedLight) near.push_back(other);
+    alone = alone && apart >= kAlone;
   }
-  const bool alone = std::none_of(others.begin(), others.end(), [&](const Circle& other) {
-    return distance(other.centre.x_px, other.centre.y_px, disc) < kAlone * disc.radius_px;
-  });
-  LedReading reading;
-  reading.strength = spot.strength;
-  if (spot.strength < kLeastLight) {
-    reading.clear = alone && spot.strength < kClearlyDark * kLeastLight;
-    return reading;
-  }
-  const Hue hue = classify(light, disc, spot);
-  reading.led = hue.led;
-  reading.clear = alone && hue.pure && spot.strength > kClearlyLit * kLeastLight;
-  const double dx = light.left + spot.x * light.stride - disc.centre.x_px,
-               dy = light.top + spot.y * light.stride - disc.centre.y_px;
-  if (std::hypot(dx, dy) > 0.4 * disc.radius_px) reading.bearing_rad = std::atan2(-dy, dx);
-  return reading;
+  if (near.empty()) return reading_alone(light_around(picture, disc, others, kOuter), disc, alone);
+  return reading_shared(light_around(picture, disc, others, kSourcesReach), disc, near);
 }
 
 }  // namespace kilotwin::track

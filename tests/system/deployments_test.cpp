@@ -349,10 +349,9 @@ class Deployments : public testing::Test {
            result.position_mm.rms() < 1 && result.straight_deg.rms() < 5 && result.free_deg.rms() < 10 &&
            overall.rms() < 10 && leds_are_as_asked(result);
   }
-  /// Of robots in a jam, the light of a neighbour's LED beside the own one is taken for a part of it.
   static bool leds_are_as_asked(const Comparison& result) {
     return static_cast<double>(result.free_right) > 0.99 * static_cast<double>(result.free_leds) &&
-           static_cast<double>(result.steady_right) > 0.8 * static_cast<double>(result.steady_leds);
+           static_cast<double>(result.steady_right) > 0.99 * static_cast<double>(result.steady_leds);
   }
   static void print(const Comparison& result) {
     const auto percent = [](long right, long of) {

@@ -70,16 +70,28 @@ const run = (name, robots) =>
 const served = start([view, "view", "--domain", domain, "--foxglove", "--port", "0", "--origin", "https://viewer.example"]);
 const url = (await served.says(/ws:\/\/127\.0\.0\.1:\d+/))[0];
 
+/** Octets that the server has sent to a viewer and that its socket has no room for. */
+function octetsWaiting(socket) {
+  const hex = (port) => port.toString(16).toUpperCase().padStart(4, "0");
+  const { localPort, remotePort } = socket._socket;
+  for (const line of fs.readFileSync("/proc/net/tcp", "utf8").split("\n")) {
+    const [, local, remote, , queues] = line.trim().split(/\s+/);
+    if (local?.endsWith(`:${hex(remotePort)}`) && remote?.endsWith(`:${hex(localPort)}`)) return parseInt(queues, 16);
+  }
+  throw new Error("the viewer is disconnected");
+}
+
 /** A viewer that subscribes to all channels and collects what comes. */
 function viewer() {
   const client = new FoxgloveClient({ ws: new WebSocket(url, [FoxgloveClient.SUPPORTED_SUBPROTOCOL]) });
-  const seen = { infos: [], times: [], messages: {}, topics: new Map(), types: new Map(), client };
+  const seen = { infos: [], times: [], messages: {}, channels: new Map(), topics: new Map(), types: new Map(), client };
   client.on("serverInfo", (info) => seen.infos.push(info));
   client.on("time", ({ timestamp }) => seen.times.push(timestamp));
   client.on("advertise", (channels) => {
     for (const channel of channels) {
       const set = descriptor.FileDescriptorSet.decode(Buffer.from(channel.schema, "base64"));
       seen.types.set(channel.topic, protobuf.Root.fromDescriptor(set).lookupType(channel.schemaName));
+      seen.channels.set(channel.topic, channel.id);
       seen.topics.set(client.subscribe(channel.id), channel.topic);
     }
   });
@@ -143,10 +155,18 @@ try {
   const deaf = new WebSocket(url, ["foxglove.sdk.v1"]);
   await new Promise((open) => deaf.on("open", open));
   deaf.on("error", () => {});
-  deaf.send(JSON.stringify({ op: "subscribe", subscriptions: [...Array(100).keys()].map((id) => ({ id, channelId: id })) }));
+  // Many subscriptions of one channel: some megabytes in a second, more than the sockets of both sides hold.
+  const poses = late.channels.get("/poses");
+  deaf.send(JSON.stringify({ op: "subscribe", subscriptions: [...Array(100).keys()].map((id) => ({ id, channelId: poses })) }));
   deaf.pause();
-  const seenBefore = late.messages["/robots"].length; // its own bound is that of the newest message of each channel
-  await late.until("states beside a viewer that never reads", () => late.messages["/robots"].length >= seenBefore + 10);
+  // Its sockets are full when what waits is the same over ten states, which others see.
+  let waiting = 0, seenBefore = 0;
+  await late.until("states beside a viewer whose sockets are full", () => {
+    const now = octetsWaiting(deaf), seen = late.messages["/robots"].length;
+    if (now !== waiting) [waiting, seenBefore] = [now, seen];
+    return waiting > 0 && seen >= seenBefore + 10;
+  });
+  console.log(`${waiting} octets wait for the viewer that never reads`);
   deaf.terminate();
 
   // Host names of other machines are refused, and pages that are not of a viewer, of this machine, or of --origin.

@@ -164,8 +164,9 @@ TEST(Headings, StayBoundedWherePositionsJump) {
   }
 }
 
-/// The hypothesis that only seen headings can speak for must not run away meanwhile.
-TEST(Headings, ArePossibleAgainAfterAnHourInTheDark) {
+/// Only seen headings can speak for the hypothesis of a robot that turns in place. Without them it has no weight, and its place is
+/// that of an hour before. It must begin anew where the robot is.
+TEST(Headings, OfARobotThatTurnsInPlaceAreSeenAfterAnHourInTheDark) {
   constexpr double kStep_s = 0.1, kLit_s = 20, kDark_s = 3600;
   std::mt19937_64 random(4);
   std::normal_distribution<double> noise(0, 1);
@@ -184,6 +185,16 @@ TEST(Headings, ArePossibleAgainAfterAnHourInTheDark) {
   ASSERT_TRUE(filter.heading());
   EXPECT_NEAR(std::remainder(filter.heading()->heading_rad - robot.heading_rad, 2 * kPi), 0, 0.15);
   EXPECT_LT(filter.heading()->variance_rad2, 0.05);
+  // Something holds it.
+  constexpr double kHeld_s = 8, kTurn_rad_s = 0.6;
+  const double x = robot.centre_x(), y = robot.centre_y();
+  for (int i = 1; i * kStep_s < kHeld_s; ++i) {
+    robot.heading_rad += kTurn_rad_s * kStep_s;
+    filter.update(kDark_s + 2 * kLit_s + i * kStep_s, x + 0.1 * noise(random), y + 0.1 * noise(random), 0.1,
+                  wrapped(std::remainder(robot.heading_rad, 2 * kPi) + 0.1 * noise(random)), 0.1);
+  }
+  EXPECT_GT(filter.modes()[HeadingFilter::kTurned], 0.5);
+  EXPECT_NEAR(std::remainder(filter.heading()->heading_rad - robot.heading_rad, 2 * kPi), 0, 0.15);
 }
 
 TEST(Headings, OfARobotThatAWallHoldsAreUncertain) {

@@ -5,11 +5,13 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <opencv2/imgcodecs.hpp>
 #include <random>
 #include <set>
 #include <tuple>
 
 #include "clients/cameras/renderer.hpp"
+#include "clients/cameras/robot_look.hpp"
 #include "clients/track/brightness.hpp"
 #include "core/plan/world.hpp"
 #include "idl/experiment.pb.h"
@@ -172,6 +174,66 @@ TEST(Crowd, RobotsThatTouchKeepTheirColours) {
     }
     std::printf("64 robots that touch, %.2f px/mm: LED %.2f %%\n", px_per_mm, 100.0 * right / all);
     EXPECT_GT(right, 0.99 * all) << px_per_mm;
+  }
+}
+
+/// Two robots touch, and their LEDs stand opposite: each of the 64 pairs of colours, with and without JPEG, whose colours have half
+/// the resolution.
+TEST(Crowd, PairsThatTouchWithTheirLedsKeepTheirColours) {
+  constexpr double kSide_mm = 920, kPitch_mm = 110, kApart_mm = 33.1;
+  const double led_rad = std::atan2(cameras::kLedLeft_mm, cameras::kLedForward_mm);
+  proto::Experiment experiment;
+  experiment.mutable_arena()->set_width_mm(kSide_mm);
+  experiment.mutable_arena()->set_height_mm(kSide_mm);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> direction(-kPi, kPi), off(-0.6, 0.6);
+  for (const double px_per_mm : {0.82, 1.3, 2.0}) {
+    const int side_px = cvRound(kSide_mm * px_per_mm);
+    cameras::CameraModel camera = cameras::CameraModel::overhead(side_px, side_px, px_per_mm);
+    camera.read_noise = 3;
+    camera.uneven_light = 0.2;
+    camera.blur_px = 0.7;
+    cameras::Renderer renderer(World(experiment), camera);
+    int all = 0, right = 0, colours = 0, colours_right = 0;
+    for (std::uint64_t frame = 0; frame < 6; ++frame) {
+      cameras::Scene scene;
+      std::vector<Circle> discs;
+      const auto add = [&](const Pose& pose, std::uint32_t led) {
+        scene.robots.push_back(
+            {static_cast<std::uint32_t>(scene.robots.size()), pose, bits_of(static_cast<Led>(led)), 0, 0, 0});
+        const cv::Point2d centre = renderer.centre_px(pose);
+        discs.push_back({{centre.x, centre.y}, kRobotRadius_mm * px_per_mm});
+      };
+      for (std::uint32_t pair = 0; pair < 64; ++pair) {
+        const double x = kPitch_mm * (pair % 8 - 3.5), y = kPitch_mm * (pair / 8 - 3.5),
+                     to_other = direction(random);
+        add({x, y, to_other + off(random) - led_rad}, pair % 8);
+        add({x + kApart_mm * std::cos(to_other), y + kApart_mm * std::sin(to_other),
+             to_other + kPi + off(random) - led_rad},
+            pair / 8);
+      }
+      cv::Mat picture = renderer.render(scene, frame);
+      if (frame % 2 == 1) {
+        std::vector<unsigned char> octets;
+        cv::imencode(".jpg", picture, octets, {cv::IMWRITE_JPEG_QUALITY, 90});
+        picture = cv::imdecode(octets, cv::IMREAD_COLOR);
+      }
+      for (std::size_t i = 0; i < discs.size(); ++i) {
+        std::vector<Circle> others = discs;
+        others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+        const bool is_right = bits_of(read_led(picture, discs[i], others).led) == scene.robots[i].led;
+        ++all;
+        right += is_right ? 1 : 0;
+        if (scene.robots[i].led == bits_of(Led::kWhite)) continue;
+        ++colours;
+        colours_right += is_right ? 1 : 0;
+      }
+    }
+    std::printf("pairs whose LEDs stand opposite, %.2f px/mm: LED %.2f %%, without white ones %.2f %%\n", px_per_mm,
+                100.0 * right / all, 100.0 * colours_right / colours);
+    EXPECT_GE(colours_right, 0.99 * colours) << px_per_mm;
+    // White light has no hue of its own: a neighbour's may be taken for it.
+    EXPECT_GE(right, 0.98 * all) << px_per_mm;
   }
 }
 
