@@ -247,13 +247,16 @@ int judge_rivals(const Arguments& arguments, const fs::path& folder) {
 /// Counts how many 95 % intervals hold the true value, by parameter.
 class Coverage {
  public:
-  void add(const std::string& parameter, double truth, double value, double sd) {
+  void add(const std::string& set, const std::string& parameter, double truth, double value, double sd) {
     constexpr double kNormal95 = 1.96;
-    add_interval(parameter, truth, value - kNormal95 * sd, value + kNormal95 * sd);
+    add_interval(set, parameter, truth, value - kNormal95 * sd, value + kNormal95 * sd);
   }
-  void add_interval(const std::string& parameter, double truth, double low, double high) {
+  /// Prints an interval that lacks the truth.
+  void add_interval(const std::string& set, const std::string& parameter, double truth, double low, double high) {
     auto& [held, all] = counts_[parameter];
-    held += low <= truth && truth <= high ? 1 : 0;
+    const bool holds = low <= truth && truth <= high;
+    if (!holds) fmt::print("{}: {} is {:.6g}, not in {:.6g}..{:.6g}\n", set, parameter, truth, low, high);
+    held += holds ? 1 : 0;
     ++all;
   }
   void print() const {
@@ -296,7 +299,7 @@ int judge_coverage(const Arguments& arguments, const fs::path& folder) {
         std::ifstream in(folder / scene.name / "out" / "result.json");
         const nlohmann::json result = nlohmann::json::parse(in);
         const auto base = [&](const char* parameter, double truth) {
-          coverage.add(parameter, truth, result.at("base").at(parameter).get<double>(),
+          coverage.add(scene.name, parameter, truth, result.at("base").at(parameter).get<double>(),
                        result.at("base_sd").at(parameter).get<double>());
         };
         base("straight_speed_mm_s", scene.straight_mm_s);
@@ -308,7 +311,7 @@ int judge_coverage(const Arguments& arguments, const fs::path& folder) {
           const nlohmann::json &low = result.at("noise_low").at(parameter),
                                &high = result.at("noise_high").at(parameter);
           // Null: a variance that may be as large as any.
-          coverage.add_interval(parameter, truth, low.get<double>(),
+          coverage.add_interval(scene.name, parameter, truth, low.get<double>(),
                                 high.is_null() ? INFINITY : high.get<double>());
         };
         noise("tracker_position_sd_mm", scene.tracker_sd_mm);
@@ -316,8 +319,10 @@ int judge_coverage(const Arguments& arguments, const fs::path& folder) {
         noise("factor_variance_s", scene.factor_sd * scene.factor_sd * scene.step_s);
         for (const nlohmann::json& robot : result.at("robots")) {
           const Wheels<double>& bias = played.individuals.at(robot.at("robot").get<std::size_t>()).bias_mm_s;
-          coverage.add("bias_left_mm_s", bias.left, robot.at("bias_left_mm_s"), robot.at("sd_left_mm_s"));
-          coverage.add("bias_right_mm_s", bias.right, robot.at("bias_right_mm_s"), robot.at("sd_right_mm_s"));
+          coverage.add(scene.name, "bias_left_mm_s", bias.left, robot.at("bias_left_mm_s"),
+                       robot.at("sd_left_mm_s"));
+          coverage.add(scene.name, "bias_right_mm_s", bias.right, robot.at("bias_right_mm_s"),
+                       robot.at("sd_right_mm_s"));
         }
       });
   coverage.print();

@@ -49,64 +49,56 @@ std::vector<Point> points_of(const Fitter& fitter, const FitState& state) {
   return some;
 }
 
-/// Half the sum of squares that a wave of this phase explains.
-double power_of(const std::vector<Point>& points, const Wave& k) {
-  double cosine = 0, sine = 0, cc = 0, ss = 0;
-  for (const Point& p : points) {
-    const double phase = k[0] * p.x_mm + k[1] * p.y_mm - k[2] * p.time_s;
-    const double c = std::cos(phase), s = std::sin(phase);
-    cosine += p.score * c;
-    sine += p.score * s;
-    cc += p.information * c * c;
-    ss += p.information * s * s;
-  }
-  return 0.5 * (cosine * cosine / std::max(cc, 1e-9) + sine * sine / std::max(ss, 1e-9));
-}
-
 struct Peak {
   Wave wave;
   double power;
 };
 
-/// The periodogram along the frequencies of one pair of wave numbers, by recurrence.
-Peak best_frequency(const std::vector<Point>& points, double kx, double ky, double step_w, int steps) {
-  using Complex = std::complex<double>;
-  std::vector<Complex> at(points.size()), by(points.size());
-  double information = 0;
+/// exp(i number value) of all points. Sines and cosines of many waves would take most of the search's time: their raster and their
+/// ascent need products of few such columns only.
+using Phasors = Eigen::ArrayXcd;
+template <class Value> Phasors phasors(const std::vector<Point>& points, double number, Value&& value) {
+  Phasors all(static_cast<Eigen::Index>(points.size()));
+  for (std::size_t i = 0; i < points.size(); ++i)
+    all[static_cast<Eigen::Index>(i)] = std::polar(1.0, number * value(points[i]));
+  return all;
+}
+double x_of(const Point& p) { return p.x_mm; }
+double y_of(const Point& p) { return p.y_mm; }
+double less_time_of(const Point& p) { return -p.time_s; }
+
+/// Half the sum of squares that a wave explains.
+double power_of(const std::vector<Point>& points, const Phasors& at) {
+  double cosine = 0, sine = 0, cc = 0, all = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Point& p = points[i];
-    at[i] = std::polar(p.score, kx * p.x_mm + ky * p.y_mm + steps * step_w * p.time_s);
-    by[i] = std::polar(1.0, -step_w * p.time_s);
-    information += p.information / 2;
+    const double c = at[static_cast<Eigen::Index>(i)].real(), s = at[static_cast<Eigen::Index>(i)].imag();
+    cosine += p.score * c;
+    sine += p.score * s;
+    cc += p.information * c * c;
+    all += p.information;
   }
-  Peak best{{kx, ky, 0}, 0};
-  for (int j = -steps; j <= steps; ++j) {
-    Complex sum = 0;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      sum += at[i];
-      at[i] *= by[i];
-    }
-    // A wave that stands still is a map; robots and biases absorb what is constant.
-    if (j == 0) continue;
-    const double power = 0.5 * std::norm(sum) / std::max(information, 1e-9);
-    if (power > best.power) best = {{kx, ky, j * step_w}, power};
-  }
-  return best;
+  return 0.5 * (cosine * cosine / std::max(cc, 1e-9) + sine * sine / std::max(all - cc, 1e-9));
 }
 
 Peak climbed(const std::vector<Point>& points, Peak peak, const Wave& step) {
-  peak.power = power_of(points, peak.wave);
+  Phasors at = phasors(points, peak.wave[0], x_of) * phasors(points, peak.wave[1], y_of) *
+               phasors(points, peak.wave[2], less_time_of);
+  peak.power = power_of(points, at);
   int steps = 0;
   for (double part = 0.5; part > 0.02; part /= 2) {
+    const std::array<Phasors, 3> by{phasors(points, part * step[0], x_of), phasors(points, part * step[1], y_of),
+                                    phasors(points, part * step[2], less_time_of)};
     for (bool better = true; better && steps < kMostSteps; ++steps) {
       better = false;
       for (std::size_t d = 0; d < 3; ++d) {
         for (const double sign : {1.0, -1.0}) {
-          Wave trial = peak.wave;
-          trial[d] += sign * part * step[d];
+          Phasors trial = sign > 0 ? Phasors(at * by[d]) : Phasors(at * by[d].conjugate());
           const double power = power_of(points, trial);
           if (power <= peak.power) continue;
-          peak = {trial, power};
+          peak.wave[d] += sign * part * step[d];
+          peak.power = power;
+          at.swap(trial);
           better = true;
         }
       }
@@ -133,6 +125,49 @@ Raster raster_of(double width_mm, double height_mm, double duration_s, std::size
       return {step, static_cast<int>(across), static_cast<int>(up), static_cast<int>(steps)};
   }
 }
+
+/// The periodogram of the points on a raster.
+class Periodogram {
+ public:
+  Periodogram(const std::vector<Point>& points, const Raster& raster)
+      : raster_(raster), by_(phasors(points, raster.step[2], less_time_of)) {
+    for (int i = 0; i <= raster.across; ++i) along_x_.push_back(phasors(points, i * raster.step[0], x_of));
+    for (int j = 0; j <= raster.up; ++j) along_y_.push_back(phasors(points, j * raster.step[1], y_of));
+    start_ = phasors(points, -raster.steps * raster.step[2], less_time_of);
+    double information = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      start_[static_cast<Eigen::Index>(i)] *= points[i].score;
+      information += points[i].information / 2;
+    }
+    information_ = std::max(information, 1e-9);
+  }
+  /// The best frequency of wave numbers i and j of the raster, by recurrence.
+  [[nodiscard]] Peak best_frequency(int i, int j) const {
+    const Phasors& x = along_x_[static_cast<std::size_t>(std::abs(i))];
+    Phasors at = start_ * along_y_[static_cast<std::size_t>(j)];
+    if (i < 0)
+      at *= x.conjugate();
+    else
+      at *= x;
+    Peak best{{i * raster_.step[0], j * raster_.step[1], 0}, 0};
+    for (int w = -raster_.steps; w <= raster_.steps; ++w) {
+      const double power = 0.5 * std::norm(at.sum()) / information_;
+      at *= by_;
+      // A wave that stands still is a map; robots and biases absorb what is constant.
+      if (w == 0 || power <= best.power) continue;
+      best.wave[2] = w * raster_.step[2];
+      best.power = power;
+    }
+    return best;
+  }
+
+ private:
+  const Raster raster_;
+  const Phasors by_;  ///< one frequency further
+  std::vector<Phasors> along_x_, along_y_;
+  Phasors start_;  ///< scores at the lowest frequency
+  double information_ = 0;
+};
 
 /// The wave of a term that is one wave; null: another term.
 Factor* wave_of(Term& term) {
@@ -224,20 +259,21 @@ Dictionary wave_dictionary_of(const Fitter& fitter, const FitState& state, const
   const double width_mm = extent.x_high_mm - extent.x_low_mm, height_mm = extent.y_high_mm - extent.y_low_mm;
   constexpr std::size_t kFewest = 500;
   if (points.size() >= kFewest && extent.duration_s > 2 * kShortest_s) {
-    const auto [step, across, up, steps] = raster_of(width_mm, height_mm, extent.duration_s, points.size());
+    const Raster raster = raster_of(width_mm, height_mm, extent.duration_s, points.size());
     // Opposite wave numbers with the opposite frequency are the same wave.
-    std::vector<std::pair<double, double>> numbers;
-    for (int j = 0; j <= up; ++j)
-      for (int i = j == 0 ? 1 : -across; i <= across; ++i) numbers.emplace_back(i * step[0], j * step[1]);
+    std::vector<std::pair<int, int>> numbers;
+    for (int j = 0; j <= raster.up; ++j)
+      for (int i = j == 0 ? 1 : -raster.across; i <= raster.across; ++i) numbers.emplace_back(i, j);
     std::vector<Peak> peaks(numbers.size());
+    const Periodogram periodogram(points, raster);
     os::in_parallel(numbers.size(), fitter.threads(), [&](std::size_t i) {
-      peaks[i] = best_frequency(points, numbers[i].first, numbers[i].second, step[2], steps);
+      peaks[i] = periodogram.best_frequency(numbers[i].first, numbers[i].second);
     });
     std::stable_sort(peaks.begin(), peaks.end(), [](const Peak& a, const Peak& b) { return a.power > b.power; });
     peaks.resize(std::min(peaks.size(), kPeaks));
     os::in_parallel(peaks.size(), fitter.threads(),
-                    [&](std::size_t i) { peaks[i] = climbed(points, peaks[i], step); });
-    const double choices = static_cast<double>(numbers.size()) * 2 * steps;
+                    [&](std::size_t i) { peaks[i] = climbed(points, peaks[i], raster.step); });
+    const double choices = static_cast<double>(numbers.size()) * 2 * raster.steps;
     for (const Peak& peak : peaks) {
       Factor wave;
       wave.shape = Factor::Shape::kTravelling;
