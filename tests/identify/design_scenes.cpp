@@ -40,8 +40,8 @@ Term term_of(const char* name, Target target, Factor factor, std::vector<double>
   Term term;
   term.name = name;
   term.blocks = {{target, {{std::move(factor)}}, kDriven}};
-  term.coefficients = Eigen::Map<const Eigen::VectorXd>(coefficients.data(),
-                                                        static_cast<Eigen::Index>(coefficients.size()));
+  term.coefficients =
+      Eigen::Map<const Eigen::VectorXd>(coefficients.data(), static_cast<Eigen::Index>(coefficients.size()));
   // A prior standard deviation of four times the largest coefficient.
   term.precision = Eigen::VectorXd::Constant(term.coefficients.size(),
                                              std::pow(4 * term.coefficients.cwiseAbs().maxCoeff(), -2));
@@ -102,7 +102,9 @@ double log_likelihood(const Scene& scene, const MeasuredSet& set, const Term& te
   const Fitter fitter(set, 1);
   FitState fit(set);
   fit.model.noise = scene.conditions.noise;
+  // From no effect: a fit that starts at the truth would favour it.
   fit.model.terms = {with_trend(term)};
+  fit.model.terms.front().coefficients.setZero();
   for (const proto::RobotModel& robot : scene.truths.front().robot()) {
     RobotBias& bias = fit.model.robots[robot.robot()];
     bias.mean_mm_s = {robot.bias_left_mm_s(), robot.bias_right_mm_s()};
@@ -110,7 +112,7 @@ double log_likelihood(const Scene& scene, const MeasuredSet& set, const Term& te
   }
   fit.tracks.find_headings(fit.model, 1);
   fit.tracks.find_centres(fit.model, 1);
-  fitter.fit(fit, 1);
+  fitter.fit(fit, 4);
   return fitter.log_likelihood(fit);
 }
 
@@ -118,18 +120,18 @@ double log_likelihood(const Scene& scene, const MeasuredSet& set, const Term& te
 
 std::vector<Pair> pairs() {
   using Shape = Factor::Shape;
-  return {{"time or driven time",
-           term_of("by-time", Target::kGain, factor_of(Shape::kLinear, Covariate::kTime, 100), {-0.06}),
-           term_of("by-driving", Target::kGain, factor_of(Shape::kLinear, Covariate::kDrivenTime, 100), {-0.075})},
-          {"time since the command or since rest",
-           term_of("start", Target::kGain, factor_of(Shape::kExponential, Covariate::kSinceCommand, 100, {4}), {-0.12}),
-           term_of("start", Target::kGain, factor_of(Shape::kExponential, Covariate::kSinceRest, 100, {6}), {-0.12})},
-          {"place or heading",
-           term_of("east", Target::kGain, factor_of(Shape::kLinear, Covariate::kX, 600), {0.04}),
-           term_of("east", Target::kGain, factor_of(Shape::kHarmonics, Covariate::kHeading, 1), {0.015, 0})},
-          {"turn rate by the motors' difference or by time",
-           term_of("turn", Target::kTurn, factor_of(Shape::kLinear, Covariate::kMotorTimeDifference, 100), {0.03}),
-           term_of("turn", Target::kTurn, factor_of(Shape::kLinear, Covariate::kTime, 100), {0.012})}};
+  return {
+      {"time or driven time",
+       term_of("by-time", Target::kGain, factor_of(Shape::kLinear, Covariate::kTime, 100), {-0.06}),
+       term_of("by-driving", Target::kGain, factor_of(Shape::kLinear, Covariate::kDrivenTime, 100), {-0.075})},
+      {"time since the command or since rest",
+       term_of("start", Target::kGain, factor_of(Shape::kExponential, Covariate::kSinceCommand, 100, {4}), {-0.12}),
+       term_of("start", Target::kGain, factor_of(Shape::kExponential, Covariate::kSinceRest, 100, {6}), {-0.12})},
+      {"place or heading", term_of("east", Target::kGain, factor_of(Shape::kLinear, Covariate::kX, 600), {0.04}),
+       term_of("east", Target::kGain, factor_of(Shape::kHarmonics, Covariate::kHeading, 1), {0.015, 0})},
+      {"turn rate by the motors' difference or by time",
+       term_of("turn", Target::kTurn, factor_of(Shape::kLinear, Covariate::kMotorTimeDifference, 100), {0.03}),
+       term_of("turn", Target::kTurn, factor_of(Shape::kLinear, Covariate::kTime, 100), {0.012})}};
 }
 
 Scene scene_of(const Pair& pair, std::uint32_t robots, double duration_s) {
@@ -144,18 +146,20 @@ Scene scene_of(const Pair& pair, std::uint32_t robots, double duration_s) {
   options.robots = robots;
   options.duration_s = duration_s;
   options.arena = {1200, 1200};
-  scene.question = question_of_models({{"first", scene.truths[0]}, {"other", scene.truths[1]}}, {}, duration_s, 600);
+  scene.question =
+      question_of_models({{"first", scene.truths[0]}, {"other", scene.truths[1]}}, {}, duration_s, 600);
   return scene;
 }
 
 Decision decide(const Scene& scene, const RecordingPlan& plan, std::size_t truth, std::uint64_t seed) {
   constexpr double kDecided_nat = 3;
-  constexpr int kLooks = 16;
+  constexpr int kLooks = 12;
   const PlanTracks tracks = play_plan(plan, scene.truths[truth], scene.conditions.every_s, true, seed);
   for (int look = 1; look <= kLooks; ++look) {
     const double at_s = plan.duration_s() * look / kLooks;
     const MeasuredSet set = set_of(plan, tracks, at_s);
-    const double ratio = log_likelihood(scene, set, scene.pair.first) - log_likelihood(scene, set, scene.pair.other);
+    const double ratio =
+        log_likelihood(scene, set, scene.pair.first) - log_likelihood(scene, set, scene.pair.other);
     if (std::abs(ratio) >= kDecided_nat) return {at_s, true, (ratio > 0) == (truth == 0)};
   }
   return {plan.duration_s(), false, false};

@@ -18,7 +18,9 @@ int main(int argc, char** argv) {
   app.add_option("--threads", threads)->capture_default_str();
   CLI11_PARSE(app, argc, argv);
 
-  fmt::print("| pair | expected, random, s | expected, plan, s | random, robot-minutes | plan, robot-minutes | saved | undecided, wrong: random | undecided, wrong: plan |\n");
+  fmt::print(
+      "| pair | expected, random, s | expected, plan, s | random, robot-minutes | plan, robot-minutes | saved | "
+      "undecided, wrong: random | undecided, wrong: plan |\n");
   fmt::print("|---|---|---|---|---|---|---|---|\n");
   for (const design_scenes::Pair& pair : design_scenes::pairs()) {
     design_scenes::Scene scene = design_scenes::scene_of(pair, robots, seconds);
@@ -45,8 +47,8 @@ int main(int argc, char** argv) {
     const double minutes = static_cast<double>(robots) / 60 / count;
     fmt::print("| {} | {:.3g} | {:.3g} | {:.2f} | {:.2f} | {:.0f} % | {}, {} of {} | {}, {} of {} |\n", pair.name,
                design.random_s, design.planned_s, by_random.seconds * minutes, by_plan.seconds * minutes,
-               100 * (1 - by_plan.seconds / by_random.seconds), by_random.open, by_random.wrong, count, by_plan.open,
-               by_plan.wrong, count);
+               100 * (1 - by_plan.seconds / by_random.seconds), by_random.open, by_random.wrong, count,
+               by_plan.open, by_plan.wrong, count);
     std::fflush(stdout);
   }
 }

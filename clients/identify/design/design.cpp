@@ -25,7 +25,8 @@ constexpr std::uint64_t kJudgeDraws = 3;
 /// Uniform random numbers of one robot's trial.
 class Draws {
  public:
-  Draws(std::uint64_t seed, std::uint32_t robot, std::int64_t trial) : random_(seed), robot_(robot), trial_(trial) {}
+  Draws(std::uint64_t seed, std::uint32_t robot, std::int64_t trial)
+      : random_(seed), robot_(robot), trial_(trial) {}
   double uniform() { return random_.uniform(Stream::kLayout, robot_, Tick{trial_}, draw_++); }
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
   std::size_t below(std::size_t count) {
@@ -64,7 +65,8 @@ constexpr std::array<Style, 8> kStyles = {{kRandomStyle,
                                            {{0, 2, 0, 1}, 10}}};
 
 std::int64_t in_steps(double seconds) {
-  return std::max<std::int64_t>(1, std::llround(seconds / kPlanTick_s / static_cast<double>(kPlanStep))) * kPlanStep;
+  return std::max<std::int64_t>(1, std::llround(seconds / kPlanTick_s / static_cast<double>(kPlanStep))) *
+         kPlanStep;
 }
 
 std::vector<PlannedCommand> commands_of(const Style& style, std::int64_t end, Draws& draws) {
@@ -89,8 +91,7 @@ void place_anywhere(RecordingPlan& plan, std::size_t r, std::size_t others, Draw
     const double x = draws.uniform(-half_x, half_x), y = draws.uniform(-half_y, half_y);
     double nearest_mm = std::numeric_limits<double>::infinity();
     for (std::size_t o = 0; o < others; ++o)
-      if (o != r)
-        nearest_mm = std::min(nearest_mm, std::hypot(plan.robots[o].x_mm - x, plan.robots[o].y_mm - y));
+      if (o != r) nearest_mm = std::min(nearest_mm, std::hypot(plan.robots[o].x_mm - x, plan.robots[o].y_mm - y));
     if (nearest_mm <= most_mm) continue;
     most_mm = nearest_mm;
     robot.x_mm = x;
@@ -135,8 +136,8 @@ void add(Products& to, const Products& more, double factor = 1) {
 
 /// Number of rows of samples up to a time.
 Eigen::Index rows_until(const std::vector<Sample>& track, double time_s) {
-  const auto after = std::upper_bound(track.begin(), track.end(), time_s,
-                                      [](double t, const Sample& s) { return t < s.time_s; });
+  const auto after =
+      std::upper_bound(track.begin(), track.end(), time_s, [](double t, const Sample& s) { return t < s.time_s; });
   return static_cast<Eigen::Index>(after - track.begin()) * kSampleNumbers;
 }
 
@@ -171,8 +172,9 @@ class Laboratory {
     return out;
   }
   /// Whitened columns of one robot. `others`: tracks that may come near.
-  [[nodiscard]] Eigen::MatrixXd whitened_columns(const RecordingPlan& plan, const std::vector<PlanTracks>& predicted,
-                                                 std::size_t r, const PlanTracks& others) const {
+  [[nodiscard]] Eigen::MatrixXd whitened_columns(const RecordingPlan& plan,
+                                                 const std::vector<PlanTracks>& predicted, std::size_t r,
+                                                 const PlanTracks& others) const {
     const std::vector<Sample>& track = predicted.front()[r];
     Eigen::MatrixXd differences(static_cast<Eigen::Index>(track.size()) * kSampleNumbers,
                                 static_cast<Eigen::Index>(question_.columns.size()));
@@ -182,9 +184,8 @@ class Laboratory {
     return whitened(conditions_, plan.robots[r], track, usable(plan, track, r, others), differences);
   }
   /// Products of the columns of each robot up to each checkpoint.
-  [[nodiscard]] std::vector<Products> products(const RecordingPlan& plan,
-                                                      const std::vector<PlanTracks>& predicted,
-                                                      const PlanTracks& others) const {
+  [[nodiscard]] std::vector<Products> products(const RecordingPlan& plan, const std::vector<PlanTracks>& predicted,
+                                               const PlanTracks& others) const {
     std::vector<Products> out(plan.robots.size());
     const std::vector<double> at_s = checkpoints_of(plan);
     os::in_parallel(out.size(), threads_, [&](std::size_t r) {
@@ -347,7 +348,8 @@ double InformationCurve::reaches_s(double nat_needed) const {
   double before_s = 0, before = 0;
   for (std::size_t i = 0; i < nat.size(); ++i) {
     if (nat[i] >= nat_needed)
-      return nat[i] > before ? before_s + (at_s[i] - before_s) * (nat_needed - before) / (nat[i] - before) : at_s[i];
+      return nat[i] > before ? before_s + (at_s[i] - before_s) * (nat_needed - before) / (nat[i] - before)
+                             : at_s[i];
     before_s = at_s[i];
     before = nat[i];
   }

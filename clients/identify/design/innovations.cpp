@@ -127,8 +127,7 @@ Eigen::VectorXd difference_of(const std::vector<Sample>& track, const std::vecto
   const std::size_t samples = std::min(track.size(), from.size());
   Eigen::VectorXd out(static_cast<Eigen::Index>(samples) * kSampleNumbers);
   for (std::size_t k = 0; k < samples; ++k)
-    out.segment<kSampleNumbers>(static_cast<Eigen::Index>(k) * kSampleNumbers)
-        << track[k].x_mm - from[k].x_mm,
+    out.segment<kSampleNumbers>(static_cast<Eigen::Index>(k) * kSampleNumbers) << track[k].x_mm - from[k].x_mm,
         track[k].y_mm - from[k].y_mm, wrapped_angle(track[k].heading_rad - from[k].heading_rad);
   return out;
 }

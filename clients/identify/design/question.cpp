@@ -39,10 +39,10 @@ std::vector<Eigen::Index> add_base(DesignQuestion& question, const identificatio
                          [](proto::Model& m, double by) {
                            m.mutable_motion()->set_turn_speed_mm_s(m.motion().turn_speed_mm_s() + by);
                          }}),
-          add(question, {"wheel base, mm", known(sd.wheel_base_mm(), kWheelBaseSd_mm), kStep,
-                         [](proto::Model& m, double by) {
-                           m.mutable_motion()->set_wheel_base_mm(m.motion().wheel_base_mm() + by);
-                         }})};
+          add(question,
+              {"wheel base, mm", known(sd.wheel_base_mm(), kWheelBaseSd_mm), kStep, [](proto::Model& m, double by) {
+                 m.mutable_motion()->set_wheel_base_mm(m.motion().wheel_base_mm() + by);
+               }})};
 }
 
 /// Step of the derivatives by amplitudes. Tracks then differ by little, also at the end of a long recording.
@@ -82,7 +82,8 @@ std::optional<std::pair<double, double>> range_of(Function::Covariate c, double 
 }
 
 /// Effects times u, which rises from -1 to 1 over the range of the covariate of one of their functions.
-std::vector<Effect> with_trend(std::vector<Effect> effects, Function::Covariate covariate, double low, double high) {
+std::vector<Effect> with_trend(std::vector<Effect> effects, Function::Covariate covariate, double low,
+                               double high) {
   std::vector<Effect> out;
   for (Effect& effect : effects) {
     const auto at = std::find_if(effect.function().begin(), effect.function().end(),
@@ -120,9 +121,9 @@ void add_own(DesignQuestion& question, Contender& contender, const std::vector<E
   for (const Function::Covariate covariate : covariates) {
     const auto range = range_of(covariate, duration_s, reach_mm);
     if (!range) continue;
-    contender.fitted.push_back(
-        add(question, {fmt::format("trend over {}, {}", Function::Covariate_Name(covariate), contender.name), kTrendSd,
-                       kAmplitudeStep, more_of(with_trend(own, covariate, range->first, range->second))}));
+    contender.fitted.push_back(add(
+        question, {fmt::format("trend over {}, {}", Function::Covariate_Name(covariate), contender.name), kTrendSd,
+                   kAmplitudeStep, more_of(with_trend(own, covariate, range->first, range->second))}));
   }
 }
 
@@ -136,8 +137,8 @@ const identification::Effect* effect_named(const identification::Result& result,
 }
 
 /// The sum of squares that is left of a difference when a model's parameters are fitted: d'd - d'J (J'J + precision)^-1 J'd.
-double left_after_fit(const DesignQuestion& question, const Eigen::MatrixXd& products, const Eigen::VectorXd& difference,
-                      const std::vector<Eigen::Index>& fitted) {
+double left_after_fit(const DesignQuestion& question, const Eigen::MatrixXd& products,
+                      const Eigen::VectorXd& difference, const std::vector<Eigen::Index>& fitted) {
   Eigen::MatrixXd information = products(fitted, fitted);
   for (std::size_t i = 0; i < fitted.size(); ++i) {
     const double sd = question.columns[static_cast<std::size_t>(fitted[i])].sd;
@@ -195,7 +196,8 @@ DesignQuestion question_of_models(const std::vector<std::pair<std::string, proto
     const proto::Model quiet = without_tracker_noise(model);
     for (const Effect& effect : quiet.effect()) own.insert(content_of(effect));
     for (const std::string& content : own) ++holders[content];
-    if (const auto same = std::find(contents.begin(), std::prev(contents.end()), own); same != std::prev(contents.end()))
+    if (const auto same = std::find(contents.begin(), std::prev(contents.end()), own);
+        same != std::prev(contents.end()))
       throw UserError(fmt::format("{}: has the same effects as {}; give models with different effects", name,
                                   models[static_cast<std::size_t>(same - contents.begin())].first));
   }

@@ -59,16 +59,19 @@ std::string program_c(const RecordingPlan& plan) {
   std::size_t count = 0;
   for (const PlannedRobot& robot : plan.robots) {
     for (const PlannedCommand& c : robot.commands)
-      fmt::format_to(std::back_inserter(steps), "{}{{{}, {}}},", count++ % 8 == 0 ? "\n  " : " ", c.tick / kPlanStep,
-                     static_cast<int>(c.motion));
+      fmt::format_to(std::back_inserter(steps), "{}{{{}, {}}},", count++ % 8 == 0 ? "\n  " : " ",
+                     c.tick / kPlanStep, static_cast<int>(c.motion));
     fmt::format_to(std::back_inserter(from), ", {}", count);
   }
-  return fmt::format(R"(/* Plays a planned recording: kilotwin identify --design. Robot N follows the N-th list of commands; other robots rest. */
+  return fmt::format(
+      R"(/* Plays a planned recording: kilotwin identify --design. Robot N follows the N-th list of commands; other robots rest. */
 #include <avr/pgmspace.h>
 #include <kilolib.h>
 
 #define ROBOTS {}
 #define STEP_TICKS {}
+/* In a simulated run setup() is called in this tick. */
+#define SETUP_TICK 2
 
 enum {{ STOP, STRAIGHT, LEFT, RIGHT }};
 
@@ -97,7 +100,7 @@ static void drive(uint8_t motion) {{
 }}
 
 static void setup(void) {{
-  start = kilo_ticks;
+  start = kilo_ticks - SETUP_TICK;
   if (kilo_uid >= ROBOTS) return;
   next = pgm_read_word(&first[kilo_uid]);
   end = pgm_read_word(&first[kilo_uid + 1]);
@@ -116,12 +119,13 @@ int main(void) {{
   return 0;
 }}
 )",
-                     plan.robots.size(), kPlanStep, steps, from);
+      plan.robots.size(), kPlanStep, steps, from);
 }
 
 std::string experiment_text(const RecordingPlan& plan, const std::string& name, const std::string& program,
                             const std::string& poses, double every_s) {
-  return fmt::format(R"(# The planned recording, simulated. kilotwin export RUN --commands and --trajectories give the data of identify.
+  return fmt::format(
+      R"(# The planned recording, simulated. kilotwin export RUN --commands and --trajectories give the data of identify.
 name: "{}"
 duration_s: {:.6f}
 seed: 1
@@ -134,9 +138,12 @@ robots {{
   layout {{ poses {{ csv: "{}" }} }}
 }}
 
+# Exact clocks, so that commands.csv holds to the tick. Those of real robots differ by some 0.4 %.
+radio {{ oscillator_sd: 0 }}
+
 recording {{ every_s: {:g} event: MOTION }}
 )",
-                     name, plan.duration_s(), plan.arena.width_mm, plan.arena.height_mm, program, poses, every_s);
+      name, plan.duration_s(), plan.arena.width_mm, plan.arena.height_mm, program, poses, every_s);
 }
 
 }  // namespace kilotwin::identify

@@ -41,8 +41,8 @@ TEST(DesignInformation, OfADriftIsThatOfARegressionLine) {
   const std::vector<Sample> track = resting(41);
   std::vector<Sample> drifted = track;
   for (Sample& s : drifted) s.x_mm += 3 * s.time_s;
-  const Eigen::MatrixXd rows = whitened(conditions, {}, track, std::vector<bool>(track.size(), true),
-                                        difference_of(drifted, track));
+  const Eigen::MatrixXd rows =
+      whitened(conditions, {}, track, std::vector<bool>(track.size(), true), difference_of(drifted, track));
   // The start is unknown, so the slope of a line is estimated: the sum of (t - mean)^2 over the variance.
   EXPECT_NEAR(rows.squaredNorm(), 9 * spread_of(track) / 4, 1e-9 * rows.squaredNorm());
 }
