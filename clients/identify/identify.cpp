@@ -101,6 +101,28 @@ std::vector<Prediction> predictions_of(const Findings& f, const MeasuredSet& jud
   return out;
 }
 
+/// The written model with an ambiguous effect exchanged for its alternative, refitted. The closest alternatives first.
+std::vector<std::pair<std::string, proto::Model>> contenders_of(const Findings& f, const Fitter& fitter) {
+  constexpr std::size_t kMost = 3;
+  std::vector<Ambiguity> closest = f.found.ambiguous;
+  std::stable_sort(closest.begin(), closest.end(), [](const Ambiguity& a, const Ambiguity& b) {
+    return a.evidence_difference < b.evidence_difference;
+  });
+  std::vector<std::pair<std::string, proto::Model>> out;
+  for (const Ambiguity& a : closest) {
+    const std::vector<Term>& terms = f.found.fit.model.terms;
+    const auto at = std::find_if(terms.begin(), terms.end(), [&](const Term& t) { return t.name == a.found; });
+    const bool known = std::any_of(out.begin(), out.end(), [&](const auto& c) { return c.first == a.instead; });
+    if (!a.alternative || at == terms.end() || known || out.size() == kMost) continue;
+    FitState rival = f.found.fit;
+    rival.model.terms[static_cast<std::size_t>(at - terms.begin())] = *a.alternative;
+    fitter.fit(rival, 2);
+    out.emplace_back(a.instead, proto_of(rival.model));
+    write_noise_effects(out.back().second, rival.model.noise, f.noise_effects);
+  }
+  return out;
+}
+
 /// A model of a part of the training data, refitted to all of them.
 FitState refitted(const Fitter& fitter, const FitState& part, const MeasuredSet& whole) {
   FitState all(whole);
@@ -221,6 +243,7 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   say_progress(0.95, "simulation check");
   out.model = proto_of(f.found.fit.model);
   write_noise_effects(out.model, f.found.fit.model.noise, f.noise_effects);
+  out.contenders = contenders_of(f, fitter);
   const PosteriorDraws posterior(f.found.fit.model, f.uncertainty);
   for (std::uint32_t n = 1; n <= options.draws; ++n) {
     out.draws.push_back(proto_of(posterior.draw(kDrawsSeed, n)));

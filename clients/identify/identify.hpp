@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "clients/identify/data/measured_set.hpp"
@@ -29,6 +30,8 @@ struct Identified {
   identification::Identification found;
   std::vector<Prediction> predictions;
   std::vector<proto::Model> draws;
+  /// Models that the data do not tell from `model`, by the name of the effect that differs.
+  std::vector<std::pair<std::string, proto::Model>> contenders;
 };
 
 /// Fits the tracks of `train` that are not held out. Predicts `test`; null: the held-out tracks of `train`.

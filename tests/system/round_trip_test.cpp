@@ -114,5 +114,52 @@ TEST_F(RoundTrip, DrawsOfTheIdentifiedModelAreModels) {
   EXPECT_EQ(rows_of(scratch / "sweep/designs.csv").at(0).at(1), "3");
 }
 
+/// The commands of each robot as (tick, motion), without those at the start.
+std::map<std::string, std::vector<std::pair<long, std::string>>> commands_of(const fs::path& file) {
+  std::map<std::string, std::vector<std::pair<long, std::string>>> commands;
+  for (const auto& row : rows_of(file))
+    if (row[2] != "0") commands[row[1]].emplace_back(std::lround(std::stod(row[2]) / kTick_s), row[3]);
+  return commands;
+}
+
+TEST(PlannedRecording, IsPlayedToTheTick) {
+  const Scratch scratch;
+  fs::create_directory(scratch / "found");
+  write(scratch.path() / "found/model.txtpb",
+        "motion { straight_speed_mm_s: 10 turn_speed_mm_s: 20 wheel_base_mm: 25 }\n");
+  write(scratch.path() / "found/result.json",
+        R"({"base": {"straight_speed_mm_s": 10, "turn_speed_mm_s": 20, "wheel_base_mm": 25, "bias_sd_mm_s": 1.5},
+            "base_sd": {"straight_speed_mm_s": 0.5}, "noise": {"tracker_position_sd_mm": 1, "tracker_heading_sd_rad": 0.05},
+            "before": null, "robots": [{"robot": 0, "bias_left_mm_s": 0.5, "sd_left_mm_s": 0.2, "sd_right_mm_s": 0.2}]})");
+  const Outcome planned = kilotwin({"identify", "--design", scratch / "found", "--robots", "3", "--duration", "30",
+                                    "--arena", "900x900", "--out", scratch / "planned"},
+                                   scratch);
+  ASSERT_EQ(planned.status, 0) << planned.err;
+  EXPECT_NE(planned.out.find("nat expected"), std::string::npos) << planned.out;
+  const auto design = nlohmann::json::parse(read(scratch / "planned/design.json"));
+  EXPECT_GE(design.at("information_nat"), design.at("random_information_nat"));
+  for (const auto& parameter : design.at("parameters")) EXPECT_LT(parameter.at("sd_after"), parameter.at("sd_now"));
+
+  run({scratch / "planned/planned.txtpb", "--mode", "local"}, scratch, "run");
+  const Outcome exported = kilotwin({"export", scratch / "run", "--commands", scratch / "played.csv"}, scratch);
+  ASSERT_EQ(exported.status, 0) << exported.err;
+  const auto commands = commands_of(scratch / "planned/commands.csv");
+  EXPECT_FALSE(commands.empty());
+  EXPECT_EQ(commands_of(scratch / "played.csv"), commands);
+}
+
+TEST(PlannedRecording, RefusesOptionsThatDoNotBelongTogether) {
+  const Scratch scratch;
+  const auto refusal = [&](const Words& words) {
+    const Outcome outcome = kilotwin(words, scratch);
+    EXPECT_EQ(outcome.status, 2);
+    return outcome.err;
+  };
+  EXPECT_NE(refusal({"identify"}).find("--train: give a directory"), std::string::npos);
+  EXPECT_NE(refusal({"identify", "--train", "x", "--robots", "3"}).find("belongs to --design"), std::string::npos);
+  EXPECT_NE(refusal({"identify", "--train", "x", "--design", "y"}).find("leave out --train"), std::string::npos);
+  EXPECT_NE(refusal({"identify", "--design", scratch / "none"}).find("cannot be read"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace kilotwin::test

@@ -3,13 +3,17 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <optional>
 
 #include "clients/cli/commands.hpp"
 #include "clients/cli/identify/data_kinds.hpp"
+#include "clients/cli/identify/design_command.hpp"
 #include "clients/cli/output.hpp"
 #include "clients/cli/progress.hpp"
+#include "clients/identify/data/measured_set.hpp"
+#include "clients/identify/data/table_import.hpp"
 #include "clients/identify/identify.hpp"
 #include "clients/identify/model/model_file.hpp"
 #include "clients/identify/report/report.hpp"
@@ -26,6 +30,9 @@ namespace {
 struct IdentifyArguments {
   fs::path train, test;
   Output output;
+  std::string columns, angle = "rad", frame = "plane";
+  std::optional<double> unit_mm;
+  DesignArguments design;
   double horizon_s = 10;
   std::uint32_t threads = 2, draws = 0;
   bool quiet = false;
@@ -108,11 +115,47 @@ void write_draws(std::vector<proto::Model> draws, const fs::path& train, const f
   }
 }
 
+/// Contenders as files that `--design` reads.
+void write_contenders(std::vector<std::pair<std::string, proto::Model>> contenders, const fs::path& train,
+                      const fs::path& directory) {
+  if (contenders.empty()) return;
+  fs::create_directory(directory);
+  for (auto& [name, model] : contenders) {
+    clamp_to_ranges(model);
+    const std::string remark = fmt::format(
+        "Data of {} do not tell this model from model.txtpb: {} in place of another effect.", train.string(), name);
+    os::write_file(directory / (name + ".txtpb"), identify::text_of(model, remark));
+  }
+}
+
+/// The directory of data, or its tables under the names, units and axes that the options state.
+fs::path converted(const IdentifyArguments& arguments, const fs::path& data, const fs::path& to) {
+  const bool states =
+      !arguments.columns.empty() || arguments.unit_mm || arguments.angle != "rad" || arguments.frame != "plane";
+  if (data.empty() || !states) return data;
+  if (!fs::is_directory(data)) throw UserError(fmt::format("{}: is no directory of tables", data.string()));
+  identify::TableFormat format;
+  if (identify::has_trajectories(data)) format.run = "run";
+  if (!arguments.columns.empty()) identify::set_columns(format, arguments.columns);
+  if (arguments.columns.empty() && identify::has_headings(data)) format.heading = "heading_rad";
+  format.unit_mm = arguments.unit_mm.value_or(1);
+  format.degrees = arguments.angle == "deg";
+  format.image = arguments.frame == "image";
+  identify::import_tables(data, to, format);
+  return to;
+}
+
 int identify_data(const IdentifyArguments& arguments) {
   if (!(arguments.horizon_s > 0)) throw UserError("--horizon: give a number of seconds above 0");
   warn_beyond_cores("--threads", arguments.threads);
-  const DataKind& kind = kind_of_data("--train", arguments.train);
-  if (!arguments.test.empty() && &kind_of_data("--test", arguments.test) != &kind)
+  const fs::path fallback = "identified";
+  const fs::path out = make_plain_output(arguments.output, fallback, {arguments.train, arguments.test});
+  Unfinished unfinished(out);
+  // Tables of other trackers become files that the command reads.
+  const fs::path train = converted(arguments, arguments.train, out / "imported-train"),
+                 test = converted(arguments, arguments.test, out / "imported-test");
+  const DataKind& kind = kind_of_data("--train", train);
+  if (!arguments.test.empty() && &kind_of_data("--test", test) != &kind)
     throw UserError(fmt::format("--test {}: does not hold {}; give the same kind of data as --train",
                                 arguments.test.string(), kind.name));
   if (arguments.draws > 0 && !kind.has_draws)
@@ -120,9 +163,6 @@ int identify_data(const IdentifyArguments& arguments) {
         "--draws: models are drawn from the posterior of a fit to trajectories, and {} holds other data; leave out "
         "--draws",
         arguments.train.string()));
-  const fs::path fallback = "identified";
-  const fs::path out = make_plain_output(arguments.output, fallback, {arguments.train, arguments.test});
-  Unfinished unfinished(out);
   identify::Options options;
   options.horizon_s = arguments.horizon_s;
   options.threads = arguments.threads;
@@ -134,13 +174,14 @@ int identify_data(const IdentifyArguments& arguments) {
     progress->show(0.02 + 0.95 * share, what, what);
   };
   progress->show(0, "reading " + arguments.train.string(), "reading");
-  identify::Identified found = kind.identify(arguments.train, arguments.test, out, options);
+  identify::Identified found = kind.identify(train, test, out, options);
 
   progress->show(0.97, "drawing the report", "drawing");
   clamp_to_ranges(found.model);
   os::write_file(options.model_file,
                  identify::text_of(found.model, fmt::format("Identified from {}.", arguments.train.string())));
   write_draws(found.draws, arguments.train, out / "draws");
+  write_contenders(std::move(found.contenders), arguments.train, out / "contenders");
   os::write_file(out / "result.json", identify::json_of(found.found.result()).dump(2) + "\n");
   os::write_file(out / "predictions.csv", csv_of(found.predictions));
   identify::write_report(found.found, out / "report.html");
@@ -154,16 +195,76 @@ int identify_data(const IdentifyArguments& arguments) {
   return kDone;
 }
 
+/// Options of the plan, which other uses of the command refuse.
+constexpr std::array kDesignOptions = {"--contender", "--duration", "--robots",     "--arena",
+                                       "--every",     "--seed",     "--no-headings"};
+
+void add_design_options(CLI::App& app, DesignArguments& design) {
+  app.add_option(
+         "--design", design.result,
+         "plan the next recording instead, from the result in this directory: commands and start places that "
+         "answer most per minute")
+      ->type_name("DIR");
+  app.add_option("--contender", design.contenders,
+                 "with --design: a model that the recording is to tell from DIR/model.txtpb; repeatable (default: "
+                 "those in DIR/contenders; without any, the parameters of the model are in question)")
+      ->allow_extra_args(false)
+      ->type_name("FILE");
+  app.add_option("--duration", design.duration_s, "with --design: length of the recording, s")
+      ->capture_default_str()
+      ->type_name("SECONDS");
+  app.add_option("--robots", design.robots, "with --design: number of robots (default: as many as in the data)")
+      ->type_name("N");
+  app.add_option("--arena", design.arena, "with --design: size of the arena, mm (default: the walls of the result)")
+      ->type_name("WIDTHxHEIGHT");
+  app.add_option("--every", design.every_s, "with --design: time between two pictures of the tracker, s")
+      ->capture_default_str()
+      ->type_name("SECONDS");
+  app.add_option("--seed", design.seed, "with --design: seed of the search")->capture_default_str()->type_name("N");
+  app.add_flag("--no-headings", design.no_headings, "with --design: the tracker measures no headings");
+}
+
+int identify_or_plan(IdentifyArguments& arguments, const CLI::App& app) {
+  const bool plans = !arguments.design.result.empty();
+  if (plans) {
+    if (!arguments.train.empty() || !arguments.test.empty())
+      throw UserError("--design: plans from a result; leave out --train and --test");
+    arguments.design.threads = arguments.threads;
+    arguments.design.quiet = arguments.quiet;
+    return plan_recording(arguments.design, arguments.output);
+  }
+  for (const char* option : kDesignOptions)
+    if (app.count(option) > 0) throw UserError(fmt::format("{}: belongs to --design DIR", option));
+  if (arguments.train.empty())
+    throw UserError("--train: give a directory of measured data; or plan a recording with --design DIR");
+  return identify_data(arguments);
+}
+
 }  // namespace
 
 Command add_identify(CLI::App& program) {
   const auto arguments = std::make_shared<IdentifyArguments>();
   CLI::App& app =
       *program.add_subcommand("identify", "fit the model to measured data and find effects that it lacks");
-  app.add_option("--train", arguments->train, "directory of measured data to fit to")->required()->type_name("DIR");
+  app.add_option("--train", arguments->train, "directory of measured data to fit to")->type_name("DIR");
   app.add_option("--test", arguments->test,
                  "directory of measured data to predict, never fitted to (default: a part of --train is held out)")
       ->type_name("DIR");
+  app.add_option("--columns", arguments->columns,
+                 "names of the columns of a tracker's tables: time=t,robot=ID,x=px,y=py,heading=theta,run=trial")
+      ->type_name("NAMES");
+  app.add_option("--unit-mm", arguments->unit_mm, "length of a unit of x and y, mm: 1000 for metres (default: 1)")
+      ->check(CLI::Range(1e-6, 1e6).description(""))
+      ->type_name("MM");
+  app.add_option("--angle", arguments->angle, "unit of the headings: rad or deg")
+      ->check(CLI::IsMember({"rad", "deg"}).description(""))
+      ->capture_default_str()
+      ->type_name("UNIT");
+  app.add_option("--frame", arguments->frame,
+                 "axes: plane, y upwards and headings anticlockwise; image, y downwards and headings clockwise")
+      ->check(CLI::IsMember({"plane", "image"}).description(""))
+      ->capture_default_str()
+      ->type_name("AXES");
   add_output_options(app, arguments->output, "identified, with a number added if it exists");
   app.add_option("--horizon", arguments->horizon_s, "time from the last measurement used to a prediction, s")
       ->capture_default_str()
@@ -179,11 +280,12 @@ Command add_identify(CLI::App& program) {
       ->check(CLI::Range(0, 1000).description(""))
       ->capture_default_str()
       ->type_name("N");
+  add_design_options(app, arguments->design);
   app.add_flag("--quiet", arguments->quiet, "no progress and no summary on the screen");
   app.footer(
       "Example: kilotwin identify --train measured --out found. measured/ holds trajectories.csv with the columns "
       "run,robot,time_s,x_mm,y_mm.");
-  return {&app, [arguments] { return identify_data(*arguments); }};
+  return {&app, [arguments, &app] { return identify_or_plan(*arguments, app); }};
 }
 
 }  // namespace kilotwin::cli

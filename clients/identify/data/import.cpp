@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "clients/identify/data/measured_set.hpp"
+#include "clients/identify/data/table_import.hpp"
 #include "core/base/error.hpp"
 #include "core/csv/csv_reader.hpp"
 #include "core/csv/csv_writer.hpp"
@@ -84,7 +85,8 @@ std::vector<fs::path> importable(const fs::path& directory) {
   for (const fs::directory_entry& entry : fs::directory_iterator(directory, error)) {
     const fs::path& file = entry.path();
     if (!entry.is_regular_file(error) || name_of_run(file) == "commands") continue;
-    if ((is_ark_log(file) && looks_like_ark_log(file)) || (is_table(file) && looks_like_recording(file)))
+    if ((is_ark_log(file) && looks_like_ark_log(file)) ||
+        (is_table(file) && (looks_like_recording(file) || is_track_table(file))))
       files.push_back(file);
   }
   std::sort(files.begin(), files.end());
@@ -137,32 +139,54 @@ std::string rows_of_recording(const fs::path& file) {
   return rows;
 }
 
+namespace {
+
+enum class Kind { kArkLog, kRecording, kTrackTable };
+
+Kind kind_of(const fs::path& file) {
+  if (is_ark_log(file)) return Kind::kArkLog;
+  return is_track_table(file) ? Kind::kTrackTable : Kind::kRecording;
+}
+
+std::string rows_of(const fs::path& file, Kind kind) {
+  switch (kind) {
+    case Kind::kArkLog: return rows_of_ark_log(file);
+    case Kind::kTrackTable: return rows_of_track_table(file);
+    case Kind::kRecording: break;
+  }
+  return rows_of_recording(file);
+}
+
+}  // namespace
+
 void import_set(const fs::path& from, const fs::path& to) {
   const std::vector<fs::path> files = importable(from);
   if (files.empty()) {
     throw UserError(
         fmt::format("{}: holds neither trajectories.csv, nor ARK logs (*.tsv, *.txt, *.log), nor recordings "
-                    "(*.csv of kilotwin export --trajectories)",
+                    "(*.csv of kilotwin export --trajectories), nor tables of kilotwin track",
                     from.string()));
   }
+  const Kind kind = kind_of(files.front());
   std::map<std::string, fs::path> runs;
   std::string text;
   for (const fs::path& file : files) {
-    if (is_ark_log(file) != is_ark_log(files.front())) {
-      throw UserError(fmt::format("{}: is of another kind than {}; give ARK logs or recordings, not both",
-                                  file.string(), files.front().filename().string()));
+    if (kind_of(file) != kind) {
+      throw UserError(fmt::format(
+          "{}: is of another kind than {}; give ARK logs, recordings or tables of kilotwin track, not both",
+          file.string(), files.front().filename().string()));
     }
     const auto [known, fresh] = runs.emplace(name_of_run(file), file);
     if (!fresh)
       throw UserError(fmt::format("{}: names the same run as {}; rename one", file.string(),
                                   known->second.filename().string()));
-    text += is_ark_log(file) ? rows_of_ark_log(file) : rows_of_recording(file);
+    text += rows_of(file, kind);
   }
   std::error_code error;
   fs::create_directories(to, error);
-  os::write_file(to / "trajectories.csv", (is_ark_log(files.front()) ? "run,robot,time_s,x_mm,y_mm\n"
-                                                                     : "run,robot,time_s,x_mm,y_mm,heading_rad\n") +
-                                              text);
+  os::write_file(
+      to / "trajectories.csv",
+      (kind == Kind::kArkLog ? "run,robot,time_s,x_mm,y_mm\n" : "run,robot,time_s,x_mm,y_mm,heading_rad\n") + text);
   for (const char* name : {"commands.csv", "commands.csv.gz"}) {
     fs::remove(to / name, error);
     if (fs::exists(from / name, error)) os::write_file(to / name, os::read_file(from / name));

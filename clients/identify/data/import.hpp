@@ -3,6 +3,7 @@
 ///                a line of names. x, y are pixels of ARK's mosaic: 2000 px over 2 m from the top left corner, hence mm.
 ///                The orientation is ignored: ARK derives it from the motion of the last half second, so it lags in turns.
 ///   recordings   *.csv with the columns of `kilotwin export --trajectories`, one file per run
+///   tables of a tracker   *.csv of `kilotwin track`, one file per run (table_import.hpp)
 /// A run is named after its file, without the extension. A commands.csv in the same directory uses these names.
 #pragma once
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "clients/identify/data/command_clock.hpp"
+#include "clients/identify/data/command_response.hpp"
 #include "core/base/error.hpp"
 #include "core/stats/quantiles.hpp"
 
@@ -105,7 +106,7 @@ void demand_millimetres(const MeasuredSet& set, const std::string& from) {
         high_y - low_y < kSmallestRoom_mm)
       throw UserError(
           fmt::format("{}: run {}: {} robots, 33 mm wide each, within {:.3g} mm x {:.3g} mm; give x_mm and y_mm "
-                      "in mm (not metres)",
+                      "in mm (not metres), or state the unit: --unit-mm 1000",
                       from, run.name, run.tracks.size(), high_x - low_x, high_y - low_y));
   }
 }
@@ -125,7 +126,8 @@ void demand_radians(const MeasuredSet& set, const std::string& from) {
   }
   // Headings may count on beyond a full turn, but then they do not end at 360.
   if (all > 10 && beyond * 3 > all && most > 90 && most < 361)
-    throw UserError(fmt::format("{}: heading_rad is up to {:g}; give radians (not degrees)", from, most));
+    throw UserError(
+        fmt::format("{}: heading_rad is up to {:g}; give radians (not degrees), or --angle deg", from, most));
 }
 
 void demand_motion(const MeasuredSet& set, const std::string& from) {
@@ -160,14 +162,42 @@ void demand_motion(const MeasuredSet& set, const std::string& from) {
   const double speed = stats::upper_median(speeds);
   if (speed > kFastestMedian_mm_s)
     throw UserError(fmt::format(
-        "{}: robots drive at {:.3g} mm/s, Kilobots at about 10 mm/s; give x_mm and y_mm in mm (not pixels), "
-        "time_s in seconds",
+        "{}: robots drive at {:.3g} mm/s, Kilobots at about 10 mm/s; give x_mm and y_mm in mm (not pixels), or the "
+        "length of a unit: --unit-mm MM; time_s in seconds",
         from, speed));
   if (speed < kSlowestMedian_mm_s)
     throw UserError(
         fmt::format("{}: commanded robots drive at {:.3g} mm/s, Kilobots at about 10 mm/s; give x_mm and y_mm "
-                    "in mm (not metres), time_s in seconds (not milliseconds)",
+                    "in mm (not metres), or --unit-mm 1000; time_s in seconds (not milliseconds)",
                     from, speed));
+}
+
+/// In a picture y points down, and turns then have the wrong sign. Robots that turn against their commands show it.
+void demand_plane_axes(const MeasuredSet& set, const std::string& from) {
+  if (!set.has_commands) return;
+  std::size_t with = 0, against = 0;
+  for (const Run& run : set.runs) {
+    for (const Track& track : run.tracks) {
+      for (const MotionSegment& segment : segments_of(track)) {
+        const Motion motion = command_at(track, segment.time_s);
+        // Both neighbours of the segment under the same command: a turn of its own.
+        constexpr double kAround_s = 1.5;
+        if ((motion != Motion::kLeft && motion != Motion::kRight) ||
+            command_at(track, segment.time_s - kAround_s) != motion ||
+            command_at(track, segment.time_s + kAround_s) != motion)
+          continue;
+        ++((segment.curve_mm2_s2 > 0) == (motion == Motion::kLeft) ? with : against);
+      }
+    }
+  }
+  constexpr std::size_t kFewestTurns = 20;
+  // A faulty wheel may turn a robot against its commands, but not nearly all robots.
+  if (with + against >= kFewestTurns && against > 4 * with)
+    throw UserError(
+        fmt::format("{}: in {} of {} turns the robots turn against their commands; give y upwards and headings "
+                    "anticlockwise, or "
+                    "state that the axes are those of a picture: --frame image",
+                    from, against, with + against));
 }
 
 }  // namespace
@@ -179,6 +209,7 @@ void demand_plausible(const MeasuredSet& set, const std::string& from) {
   demand_millimetres(set, from);
   demand_radians(set, from);
   demand_motion(set, from);
+  demand_plane_axes(set, from);
 }
 
 void demand_longer_than(const MeasuredSet& set, double horizon_s, bool held_out_only, const std::string& from) {

@@ -600,8 +600,8 @@ class Loop {
       if (std::any_of(out_.ambiguous.begin(), out_.ambiguous.end(),
                       [&](const Ambiguity& a) { return a.found == chosen.name && a.instead == other.name; }))
         continue;
-      out_.ambiguous.push_back(
-          {chosen.name, other.name, chosen.covariates, other.covariates, best.evidence - f.evidence});
+      out_.ambiguous.push_back({chosen.name, other.name, chosen.covariates, other.covariates,
+                                best.evidence - f.evidence, dictionary_.term_of(other, f.relative_scale)});
     }
   }
 

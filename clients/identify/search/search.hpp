@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,7 @@ struct Ambiguity {
   std::string found, instead;
   std::vector<std::string> found_covariates, covariates;  ///< of the effect and of the alternative
   double evidence_difference = 0;
+  std::optional<Term> alternative = {};  ///< nothing: it has no form of its own
 };
 
 struct Rejected {

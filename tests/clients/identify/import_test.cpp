@@ -10,6 +10,7 @@
 #include <string>
 
 #include "clients/identify/data/measured_set.hpp"
+#include "clients/identify/data/table_import.hpp"
 #include "core/base/error.hpp"
 #include "core/os/files.hpp"
 
@@ -73,6 +74,56 @@ TEST_F(ImportTest, ArkLogsInTheMiddleAndUpright) {
 TEST_F(ImportTest, NamesOfColumnsAndACutLastLine) {
   give("a.log", "t\tid\tcolour\tx\ty\torientation\r\n1\t0\t0\t10\t20\t0\r\n\r\n2\t0\t0\t11\t20\t0\r\n3\t0\t0\t1");
   EXPECT_EQ(imported().samples(), 2U);
+}
+
+TEST_F(ImportTest, TablesOfAnyTrackerByNamesUnitsAndAxes) {
+  give("trial.csv", "ID,t,px,py,theta\n7,0.5,0.1,-0.2,90\n7,1,,,\n8,0.5,0.3,0.4,-45\n");
+  give("commands.csv", "run,robot,time_s,motion\ntrial,7,0,left\n");
+  TableFormat format;
+  set_columns(format, "time=t,robot=ID,x=px,y=py,heading=theta");
+  format.unit_mm = 1000;
+  format.degrees = format.image = true;
+  import_tables(folder_ / "from", folder_ / "to", format);
+  const MeasuredSet set = load_measured_set(folder_ / "to");
+  ASSERT_EQ(set.tracks(), 2U);
+  EXPECT_TRUE(set.has_commands);
+  EXPECT_EQ(set.runs[0].name, "trial");
+  const Sample& sample = set.runs[0].tracks[0].samples.at(0);
+  EXPECT_EQ(set.runs[0].tracks[0].robot, 7U);
+  EXPECT_EQ(set.runs[0].tracks[0].samples.size(), 1U) << "a lost robot has no sample";
+  EXPECT_DOUBLE_EQ(sample.time_s, 0.5);
+  EXPECT_NEAR(sample.x_mm, 100, 1e-9);
+  EXPECT_NEAR(sample.y_mm, 200, 1e-9) << "y upwards";
+  EXPECT_NEAR(sample.heading_rad, -M_PI / 2, 1e-8) << "anticlockwise";
+}
+
+TEST_F(ImportTest, NamesOfColumnsThatAreNoneAreReported) {
+  TableFormat format;
+  EXPECT_THROW(set_columns(format, "time=t,angle=theta"), UserError);
+  EXPECT_THROW(set_columns(format, "time="), UserError);
+  give("trial.csv", "id,t,x,y\n1,0,0,0\n");
+  try {
+    import_tables(folder_ / "from", folder_ / "to", {});
+    FAIL();
+  } catch (const UserError& error) {
+    EXPECT_NE(std::string(error.what()).find("only id, t, x, y; name it: --columns time=NAME"), std::string::npos)
+        << error.what();
+  }
+}
+
+TEST_F(ImportTest, TablesOfTheCameraTrackerInMillimetres) {
+  // Discs of 11 px: 1.5 mm per pixel. Two fragments, one without a heading.
+  give("film.csv",
+       "frame,time_s,track,x_px,y_px,radius_px,heading_rad,led\n0,0,0,100,50,11,nan,off\n"
+       "1,0.1,0,120,50,11,0.5,off\n1,0.1,4,100,250,11,nan,red\n");
+  const MeasuredSet set = imported();
+  ASSERT_EQ(set.tracks(), 2U);
+  EXPECT_TRUE(set.has_headings);
+  EXPECT_EQ(set.runs[0].tracks[1].robot, 4U);
+  EXPECT_DOUBLE_EQ(set.runs[0].tracks[0].samples[1].x_mm, 15);
+  EXPECT_DOUBLE_EQ(set.runs[0].tracks[0].samples[1].y_mm, 150) << "y upwards";
+  EXPECT_TRUE(std::isnan(set.runs[0].tracks[0].samples[0].heading_rad));
+  EXPECT_DOUBLE_EQ(set.runs[0].tracks[1].samples[0].y_mm, -150);
 }
 
 TEST_F(ImportTest, RecordingsWithHeadingsAndCommands) {

@@ -63,6 +63,28 @@ TEST(Plausible, WrongUnitsAreReported) {
   says([](Sample& s) { s.x_mm = 300 * std::round(s.x_mm / 300), s.y_mm = 0; }, "commanded robots drive");
 }
 
+TEST(Plausible, AxesOfAPictureAreReported) {
+  MeasuredSet set = good();
+  std::uint32_t left = 0;
+  for (Track& track : set.runs[0].tracks) {
+    const double turn = left++ % 2 == 0 ? 1 : -1;
+    track.commands = {{-1e300, Motion::kStop}, {0, turn > 0 ? Motion::kLeft : Motion::kRight}};
+    for (Sample& s : track.samples) {
+      s.x_mm = 300.0 * track.robot + 30 * std::cos(0.4 * s.time_s);
+      s.y_mm = turn * 30 * std::sin(0.4 * s.time_s);
+    }
+  }
+  EXPECT_NO_THROW(demand_plausible(set, "DIR"));
+  for (Track& track : set.runs[0].tracks)
+    for (Sample& s : track.samples) s.y_mm = -s.y_mm;
+  try {
+    demand_plausible(set, "DIR");
+    FAIL();
+  } catch (const UserError& error) {
+    EXPECT_NE(std::string(error.what()).find("--frame image"), std::string::npos) << error.what();
+  }
+}
+
 TEST(Plausible, RobotNumbersThatNoModelFileTakesAreReported) {
   MeasuredSet set = good();
   set.runs[0].tracks.back().robot = 99'999;

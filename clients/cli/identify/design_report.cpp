@@ -1,0 +1,150 @@
+#include "clients/cli/identify/design_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "clients/report/html.hpp"
+#include "clients/report/plot.hpp"
+#include "core/base/say.hpp"
+#include "core/os/files.hpp"
+
+namespace kilotwin::cli {
+namespace {
+
+using identify::Design, identify::DesignQuestion;
+
+double robot_minutes(const Design& design) {
+  return static_cast<double>(design.plan.robots.size()) * design.plan.duration_s() / 60;
+}
+
+nlohmann::ordered_json design_json(const Design& design, const DesignQuestion& question,
+                                   const std::string& source) {
+  nlohmann::ordered_json json{{"source", source},
+                              {"criterion", question.of_parameters() ? "D-optimality" : "T-optimality"}};
+  for (const identify::Contender& contender : question.models) json["models"].push_back(contender.name);
+  json["robots"] = design.plan.robots.size();
+  json["duration_s"] = design.plan.duration_s();
+  json["information_nat"] = design.planned.nat.back();
+  json["information_nat_per_robot_minute"] = design.planned.nat.back() / robot_minutes(design);
+  json["random_information_nat"] = design.random_nat;
+  json["random_information_nat_per_robot_minute"] = design.random_nat / robot_minutes(design);
+  json["compared_nat"] = design.needed_nat;
+  json["compared_after_s"] = design.planned_s;
+  json["random_compared_after_s"] = design.random_s;
+  json["saved_share"] = design.saved();
+  json["at_s"] = design.planned.at_s;
+  json["information_until_nat"] = design.planned.nat;
+  for (const identify::InformationCurve& curve : design.random)
+    json["random_information_until_nat"].push_back(curve.nat);
+  for (std::size_t p = 0; p < design.sd_after.size(); ++p) {
+    const identify::DesignColumn& parameter = question.columns[p];
+    json["parameters"].push_back(
+        {{"name", parameter.name}, {"sd_now", parameter.sd}, {"sd_after", design.sd_after[p]}});
+  }
+  return json;
+}
+
+Plot information_plot(const Design& design) {
+  Plot plot;
+  plot.title = "Expected information of the recording";
+  plot.x_name = "time";
+  plot.x_unit = "s";
+  plot.y_name = "information";
+  plot.y_unit = "nat";
+  PlotSeries random;
+  random.name = "random commands, mean and range";
+  random.points = false;
+  random.band = true;
+  PlotSeries planned;
+  planned.name = "the plan";
+  planned.x = random.x = design.planned.at_s;
+  planned.y = design.planned.nat;
+  for (std::size_t c = 0; c < random.x.size(); ++c) {
+    double low = INFINITY, high = -INFINITY, sum = 0;
+    for (const identify::InformationCurve& curve : design.random) {
+      low = std::min(low, curve.nat[c]);
+      high = std::max(high, curve.nat[c]);
+      sum += curve.nat[c];
+    }
+    const double mean = sum / static_cast<double>(design.random.size());
+    random.y.push_back(mean);
+    random.error.push_back(std::max(high - mean, mean - low));
+  }
+  plot.series = {std::move(random), std::move(planned)};
+  return plot;
+}
+
+/// Share of the robots' time under each command.
+html::Table table_of_commands(const Design& design) {
+  html::Table table({"command", "share of the time"});
+  std::array<double, 4> ticks = {};
+  for (const identify::PlannedRobot& robot : design.plan.robots) {
+    std::int64_t since = 0;
+    auto motion = identify::Motion::kStop;
+    const auto until = [&](std::int64_t tick) {
+      ticks[static_cast<std::size_t>(motion)] += static_cast<double>(tick - since);
+      since = tick;
+    };
+    for (const identify::PlannedCommand& c : robot.commands) {
+      until(c.tick);
+      motion = c.motion;
+    }
+    until(design.plan.ticks);
+  }
+  const double all = ticks[0] + ticks[1] + ticks[2] + ticks[3];
+  for (std::size_t m = 0; m < ticks.size(); ++m)
+    table.row({name_of(static_cast<identify::Motion>(m)), fmt::format("{:.0f} %", 100 * ticks[m] / all)});
+  return table;
+}
+
+std::string page_of(const Design& design, const DesignQuestion& question, const std::string& source) {
+  std::string body = fmt::format(
+      "<header><p class=\"kicker\">Kilotwin · identify --design</p><h1>The next recording</h1>\n"
+      "<p class=\"verdict\">{}</p></header>\n<figure>{}<figcaption>The shaded range holds {} plans of random "
+      "commands.</figcaption></figure>\n",
+      html::escaped(design_in_words(design, question)),
+      html::image(plot_svg(information_plot(design)), "information over time"), design.random.size());
+  if (!design.sd_after.empty()) {
+    html::Table table({"parameter", "standard deviation now", "after the recording"});
+    for (std::size_t p = 0; p < design.sd_after.size(); ++p)
+      table.row({html::escaped(question.columns[p].name), fmt::format("{:.3g}", question.columns[p].sd),
+                 fmt::format("{:.3g}", design.sd_after[p])});
+    body += "<section id=\"parameters\"><h2>Parameters</h2>\n" + table.text() + "</section>\n";
+  }
+  body += "<section id=\"commands\"><h2>Commands</h2>\n" + table_of_commands(design).text() + "</section>\n";
+  body += fmt::format("<section id=\"from\"><h2>Made from</h2><p>{}</p></section>\n", html::escaped(source));
+  return html::page("Kilotwin: the next recording", body);
+}
+
+}  // namespace
+
+std::string design_in_words(const Design& design, const DesignQuestion& question) {
+  const std::string gain =
+      design.saved() > 0 ? fmt::format("{:.0f} % less", 100 * design.saved()) : std::string("no less time");
+  std::string text = fmt::format(
+      "{} robots for {:.0f} s: {:.3g} nat expected, {:.3g} nat by random commands. {:.3g} nat{} take {:.0f} s by "
+      "the "
+      "plan and {:.0f} s by random commands, {}.",
+      design.plan.robots.size(), design.plan.duration_s(), design.planned.nat.back(), design.random_nat,
+      design.needed_nat,
+      !question.of_parameters() && design.needed_nat >= identify::kDecision_nat ? ", a decision," : "",
+      design.planned_s, design.random_s, gain);
+  if (!question.of_parameters() && design.planned.nat.back() < identify::kDecision_nat)
+    text += " The recording will probably not decide: plan a longer one, or more robots.";
+  return text;
+}
+
+void write_design_report(const Design& design, const DesignQuestion& question, const std::string& source,
+                         const std::filesystem::path& directory) {
+  os::write_file(directory / "design.json", design_json(design, question, source).dump(2) + "\n");
+  if (!Gnuplot::installed()) {
+    say("kilotwin: no report.html: gnuplot is not installed; scripts/setup installs it");
+    return;
+  }
+  os::write_file(directory / "report.html", page_of(design, question, source));
+}
+
+}  // namespace kilotwin::cli
