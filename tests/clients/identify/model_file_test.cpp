@@ -171,9 +171,9 @@ double size_of(Target target) {
 
 static_assert(kNeighbourRadii_mm[11] == 150);
 
-class WrittenModel : public testing::Test {
+class WrittenModelTest : public testing::Test {
  protected:
-  WrittenModel() {
+  WrittenModelTest() {
     const Random random(8);
     set_.has_commands = set_.has_headings = true;
     set_.runs.push_back({"r", {}});
@@ -268,7 +268,7 @@ class WrittenModel : public testing::Test {
   mutable std::vector<OtherRobot> list_;  ///< neighbours at one instant
 };
 
-TEST_F(WrittenModel, PredictsLikeTheFittedModel) {
+TEST_F(WrittenModelTest, PredictsLikeTheFittedModel) {
   const Random random(31);
   std::uint32_t combination = 0;
   for (int t = 0; t <= static_cast<int>(Target::kMeasuredHeading); ++t) {
