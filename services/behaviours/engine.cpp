@@ -353,8 +353,20 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
   // Read single fields. A copy of the whole struct would stall: store forwarding fails for parts that the robot has just written.
   KtRobot& robot = executor.robot();
   if (robot.state != static_cast<std::uint8_t>(LifeCycle::kRunning)) holds_[i] = 0;
-  if (requested_[i] != 0 && robot.state == static_cast<std::uint8_t>(LifeCycle::kRunning)) {
-    if (const Fault* const fault = offer(i, executor, span)) return fail_robot(i, *fault, program, slot);
+  if (requested_[i] != 0 && holds_[i] == 0 && robot.state == static_cast<std::uint8_t>(LifeCycle::kRunning)) {
+    const KtMessage* message = nullptr;
+    std::int32_t cycles = 0;
+    span.kept = false;
+    const Fault* const fault = executor.transmit(message, cycles);
+    if (fault != nullptr) return fail_robot(i, *fault, program, slot);
+    if (robot.loop_rate == KT_LOOP_AS_ON_ROBOT) robot.debt_cycles += static_cast<std::uint64_t>(cycles);
+    if (message != nullptr) {
+      std::copy_n(message->data, 9, message_[i].begin());
+      message_[i][9] = message->type;
+      crc_error_[i] = message->crc ^ kilotwin_message_crc(message_[i].data());
+      if (crc_error_[i] != 0) note_wrong_crc(i, message->crc);
+      holds_[i] = offers_[i] = 1;
+    }
   }
   if (slot.surroundings()->eeprom_written != 0) keep_eeprom(i, slot);
   note_outputs(i, robot, slot, executor.tx_period());
@@ -379,29 +391,6 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
   if (robot.loop_rate != KT_LOOP_PER_TICK) return;
   const LoopProbe& probe = probes_[plan_.program_of(share_.first + i)];
   if (probe.done < kProbes && from.count() >= probe.next) probe_loop(i, program, slot, executor);
-}
-
-/// Offers the robot's message to the radio: a new one, or the present content of the one that it holds.
-const Fault* BehavioursEngine::offer(std::uint32_t i, const Executor& executor, Span& span) {
-  const bool held = holds_[i] != 0;
-  const KtMessage* message = nullptr;
-  std::int32_t cycles = 0;
-  if (!held) span.kept = false;
-  if (const Fault* const fault = executor.transmit(held, message, cycles)) return fault;
-  KtRobot& robot = executor.robot();
-  if (!held && robot.loop_rate == KT_LOOP_AS_ON_ROBOT) robot.debt_cycles += static_cast<std::uint64_t>(cycles);
-  if (message == nullptr) return nullptr;
-  IrMessage octets;
-  std::copy_n(message->data, 9, octets.begin());
-  octets[9] = message->type;
-  const std::uint16_t error = message->crc ^ kilotwin_message_crc(octets.data());
-  // A program may be writing to its message when the tick ends. The version before is sound.
-  if (held && error != 0) return nullptr;
-  message_[i] = octets;
-  crc_error_[i] = error;
-  if (error != 0) note_wrong_crc(i, message->crc);
-  holds_[i] = offers_[i] = 1;
-  return nullptr;
 }
 
 /// Calls loop() once more in this tick, in the slot, and discards the result. On a robot loop() runs as often as it can. If

@@ -39,8 +39,7 @@ struct TrackedInputs {
 ///   2. call kilo_message_tx_success if its message has been sent;
 ///   3. call kilo_message_rx for each reception, in order of arrival;
 ///   4. run the main program until it has used up the tick;
-///   5. if the radio requests a message and the robot is running: call kilo_message_tx, or, if the robot holds a message, read that
-///      message anew.
+///   5. call kilo_message_tx if the radio requests a message, the robot is running, and it holds no message.
 /// A robot holds a message until it is sent or the robot stops running.
 ///
 /// The radio runs the processors of firmware robots; this engine copies their motors and LEDs from the radio's frame.
@@ -147,7 +146,6 @@ class BehavioursEngine {
   [[gnu::always_inline]] inline void note_outputs(std::uint32_t i, KtRobot& robot, const Slot&,
                                                   std::uint16_t tx_period);
   [[gnu::always_inline]] inline void note_motors(std::uint32_t i, KtRobot& robot, KilotwinMotorPhases&);
-  [[nodiscard]] const Fault* offer(std::uint32_t i, const Executor&, Span&);
   [[nodiscard]] bool is_first(std::uint32_t i, Warning);
   void probe_loop(std::uint32_t i, const Program&, const Slot&, const Executor&);
   void note_overflows(std::uint32_t i, KtExchange&, const Program&, const Slot&);

@@ -146,8 +146,7 @@ void Executor::run_busy_wait(Main& main, std::int32_t previous_period) const {
   if (main.left >= 0) run(main, main.left);
 }
 
-const Fault* Executor::transmit(bool held, const KtMessage*& message, std::int32_t& cycles) const {
-  slot_.exchange()->held = held ? 1 : 0;
+const Fault* Executor::transmit(const KtMessage*& message, std::int32_t& cycles) const {
   std::uint64_t sends = 0;
   const Fault* const fault = call(transmit_, sends, cycles);
   message = fault == nullptr && sends == 1 ? &slot_.exchange()->message : nullptr;

@@ -183,9 +183,8 @@ class Executor {
     } while (!receptions.empty() && robot_->reset == 0);
     return nullptr;
   }
-  /// Calls kilo_message_tx. `message` becomes the robot's message, or null if it has none. Adds the cycles to `cycles`. If the robot
-  /// already holds a message, `message` becomes its present content instead, and the robot's memory stays as it is.
-  [[nodiscard]] const Fault* transmit(bool held, const KtMessage*& message, std::int32_t& cycles) const;
+  /// Calls kilo_message_tx. `message` becomes the robot's message, or null if it has none. Adds the cycles to `cycles`.
+  [[nodiscard]] const Fault* transmit(const KtMessage*& message, std::int32_t& cycles) const;
 
  private:
   using Enter = std::uint64_t();

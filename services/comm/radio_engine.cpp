@@ -123,7 +123,7 @@ void RadioEngine::read_life_cycles(const SwarmView& swarm) {
                       life_cycle == LifeCycle::kFlat || life_cycle == LifeCycle::kAbsent ||
                       is_external_[robot] != 0 || deaf_[robot] != 0;
     const bool running = life_cycle == LifeCycle::kRunning && is_external_[robot] == 0;
-    const int kept = state_[robot] & (kHolding | kSending | kFinished);
+    const int kept = state_[robot] & (kHolding | kSending);
     state_[robot] = static_cast<std::uint8_t>(kept | (running ? kRunning : 0) | (deaf ? 0 : kReceptive));
     if (!running && kept != 0) drop_message(robot);
     if (firmware_ && firmware_->has(robot) && firmware_->listening(robot)) state_[robot] |= kFirmware;
@@ -134,9 +134,7 @@ void RadioEngine::take_offers(const SwarmView& swarm) {
   for (std::size_t n = 0; n < swarm.offer_robot.size(); ++n) {
     const std::uint32_t robot = swarm.offer_robot[n];
     KILOTWIN_DEMAND(robot < state_.size());
-    if (!is(robot, kRunning)) continue;
-    // A newer version of a message that is on the air already, or that was sent before the host knew of it.
-    if (is(robot, kHolding) ? is(robot, kSending) : is(robot, kFinished)) continue;
+    if (!is(robot, kRunning) || is(robot, kHolding)) continue;
     state_[robot] |= kHolding;
     message_[robot] = swarm.offer_message[n];
     crc_error_[robot] = swarm.offer_crc_error[n];
@@ -175,7 +173,6 @@ void RadioEngine::contend(Tick now, const SwarmView& swarm) {
   if (table_.used()) neighbourhood_.sort();
   timers_.begin_tick();
   for (std::uint32_t i = 0; i < state_.size(); ++i) {
-    state_[i] &= static_cast<std::uint8_t>(~kFinished);
     switch (state_[i] & (kRunning | kHolding | kSending)) {
       case kRunning | kHolding: schedule(i, end); break;
       case kRunning:
@@ -363,7 +360,7 @@ void RadioEngine::finish(std::uint32_t index, Cycles end) {
   timers_.restart_clock(robot);
   timers_.pass(robot, end);
   if (transmission.orphaned) return;
-  state_[robot] = static_cast<std::uint8_t>((state_[robot] & ~kHolding) | kFinished);
+  state_[robot] &= static_cast<std::uint8_t>(~kHolding);
   if (owns(robot)) sent_.push_back(robot);
 }
 
@@ -489,10 +486,8 @@ void RadioEngine::emit(HostId host, RadioFrame& frame) const {
   }
   frame.ask.clear();
   const Cycles from = begin_of(tick_ + 1), until = begin_of(tick_ + 2);
-  // A robot that holds a message is asked again, for the newest version. `model: SIMPLE` sends what it has.
-  const std::uint8_t busy = simple_ ? kHolding | kSending : kSending;
   for (std::uint32_t i = share.first; i < share.last; ++i) {
-    if ((state_[i] & (kRunning | busy)) != kRunning || !owns(i)) continue;
+    if ((state_[i] & (kRunning | kHolding | kSending)) != kRunning || !owns(i)) continue;
     if (simple_ ? next_send_[i] < until : timers_.exceeds(i, tx_period_[i], from, until)) frame.ask.push_back(i);
   }
   frame.sent.clear();
@@ -537,9 +532,8 @@ std::uint64_t RadioEngine::hash_part() const {
   std::uint64_t sum = (region_.contains(0, 0) ? overhead_.hash() : 0) + (firmware_ ? firmware_->hash() : 0);
   for (std::uint32_t i = 0; i < state_.size(); ++i) {
     if (!owns(i)) continue;
-    const std::uint64_t counts = timers_.count_word(i) |
-                                 std::uint64_t{state_[i] & ~std::uint32_t{kFinished}} << 32 |
-                                 std::uint64_t{receptions_.count(i)} << 40;
+    const std::uint64_t counts =
+        timers_.count_word(i) | std::uint64_t{state_[i]} << 32 | std::uint64_t{receptions_.count(i)} << 40;
     const std::uint64_t next_send = simple_ ? static_cast<std::uint64_t>(next_send_[i]) : 0;
     sum += entity_hash(HashDomain::kRadio, i, {timers_.time_word(i) + next_send, counts});
   }

@@ -17,8 +17,7 @@
 /// Robots that are SLEEPING or FAILED receive nothing. Neither do real robots.
 ///
 /// The slot. From the offer until success, a robot's message is in its host's slot and in the slot here. Both sides empty
-/// it when the robot leaves RUNNING. A packet on the air then continues to its end and is not reported. Until the message is on
-/// the air, the host may offer a newer version of it, which takes its place. One that comes too late is dropped.
+/// it when the robot leaves RUNNING. A packet on the air then continues to its end and is not reported.
 ///
 /// `model: SIMPLE` is the model of the ARGoS paper, for comparison, without packets in time: simple_radio.cpp.
 ///
@@ -125,7 +124,6 @@ class RadioEngine {
   static constexpr std::uint8_t kHolding = 4;    ///< its slot holds a message
   static constexpr std::uint8_t kSending = 8;    ///< it is sending
   static constexpr std::uint8_t kFirmware = 16;  ///< it runs firmware, which is listening
-  static constexpr std::uint8_t kFinished = 32;  ///< its message was sent in the last tick; not part of the hash
 
   struct Attempt {
     Cycles time;

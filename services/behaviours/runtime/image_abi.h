@@ -7,7 +7,7 @@
 #include "core/base/motor_phases.h"
 
 #define KT_IMAGE_MAGIC 0x6e6977746f6c696bu /* "kilotwin" */
-#define KT_IMAGE_VERSION 11u
+#define KT_IMAGE_VERSION 10u
 /* Size of the buffer for text that a robot prints in one tick. A serial line of 38400 baud sends 126 octets per tick. */
 #define KT_LOG_OCTETS 3584
 /* Section of the heap. It is the last of a robot's memory, so that only its used part need be saved. */
@@ -119,8 +119,7 @@ struct KtExchange {
   uint32_t ended;                       /* 1: main() has returned; the host sets it to 0 */
   uint32_t receptions; /* if there are more than KT_MOST_RECEPTIONS, the host delivers them in several calls */
   uint32_t sent;       /* 1: the robot's own message has been sent */
-  uint16_t wrong_crc;  /* 1: a message of this tick has a wrong CRC */
-  uint16_t held;       /* for transmit. 1: the robot holds a message, whose present content is asked for */
+  uint32_t wrong_crc;  /* 1: a message of this tick has a wrong CRC */
   struct KtMessage message;
   struct KtReception reception[KT_MOST_RECEPTIONS];
   uint32_t log_length; /* octets printed since the host last emptied the log */

@@ -679,15 +679,11 @@ static uint64_t interrupts(void) {
   return 0;
 }
 
-/* On a robot a message is read from the program's memory when it is sent. Here it may have to wait until the channel is free. */
 static uint64_t transmit(void) {
-  static const message_t* message;
   if (robot.state != RUNNING) return 0;
-  if (!kt_exchange->held) {
-    robot.in_interrupt = KT_IN_TX;
-    message = kilo_message_tx();
-    robot.in_interrupt = 0;
-  }
+  robot.in_interrupt = KT_IN_TX;
+  const message_t* message = kilo_message_tx();
+  robot.in_interrupt = 0;
   if (message == NULL) return 0;
   __builtin_memcpy(&kt_exchange->message, message, sizeof kt_exchange->message);
   return 1;

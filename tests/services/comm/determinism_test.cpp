@@ -135,7 +135,6 @@ TEST(Determinism, LoadedEngineContinuesLikeTheSavedOne) {
     swarm.hosts.crc_error = [](std::uint32_t robot, Tick tick) {
       return static_cast<std::uint16_t>((robot + tick.count()) % 5 == 0 ? robot : 0);
     };
-    swarm.hosts.renews = true;
     auto loaded = std::make_unique<RadioEngine>(plan);
     bool following = false;
     std::mt19937_64 random(5);

@@ -51,7 +51,6 @@ class FakeHosts {
   std::vector<std::uint8_t> life_cycle;
   std::vector<std::uint16_t> tx_period;
   std::vector<std::uint8_t> sends;  ///< 0: kilo_message_tx returns NULL
-  bool renews = false;              ///< programs change the messages that wait to be sent
   /// The message that a robot hands over.
   std::function<IrMessage(std::uint32_t robot, Tick)> message = [](std::uint32_t robot, Tick tick) {
     const auto t = static_cast<std::uint64_t>(tick.count());
@@ -96,7 +95,7 @@ class FakeHosts {
       if (!running(i)) slot_[i] = 0;
     }
     for (const std::uint32_t robot : radio.ask) {
-      if ((slot_[robot] != 0 && !renews) || sends[robot] == 0 || !running(robot)) continue;
+      if (slot_[robot] != 0 || sends[robot] == 0 || !running(robot)) continue;
       slot_[robot] = 1;
       frame.offer_robot.push_back(robot);
       frame.offer_message.push_back(message(robot, from));

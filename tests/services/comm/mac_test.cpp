@@ -188,33 +188,6 @@ TEST(Mac, AsksExactlyBeforePossibleAttempts) {
   EXPECT_EQ(swarm.radio.counters().attempted, 0u);
 }
 
-/// Robots wait for each other. The message that is received in tick k + 1 was offered in tick k at the latest, and made one tick
-/// before. A packet that straddles the end of a tick is a tick older.
-TEST(Mac, TheNewestVersionOfAMessageIsSent) {
-  const auto poses = testing::grid_crowd(20, 40, testing::Facing::kRight);
-  std::uint64_t sent[2];
-  for (const bool renews : {false, true}) {
-    const RunPlan plan = make_plan("radio { range_mm: 1000 oscillator_sd: 0.01 }", poses);
-    Swarm swarm(plan);
-    swarm.hosts.renews = renews;
-    swarm.hosts.tx_period.assign(poses.size(), 100);
-    std::size_t old = 0, received = 0;
-    for (; swarm.now.count() < 400; swarm.step()) {
-      for (const IrMessage& message : swarm.frames[0].messages) {
-        ++received;
-        old += swarm.now.count() - (message[2] | message[3] << 8) > 3;
-      }
-    }
-    sent[renews ? 1 : 0] = swarm.radio.counters().sent;
-    EXPECT_GT(received, 1000u);
-    if (renews)
-      EXPECT_EQ(old, 0u);
-    else
-      EXPECT_GT(old, received / 4);
-  }
-  EXPECT_EQ(sent[0], sent[1]) << "a version that came too late was sent as a message of its own";
-}
-
 /// The robot is stopped at each tick around its first message: requested, answered, on the air, reported.
 TEST(Mac, SlotIsEmptiedOutsideRunning) {
   std::uint64_t unreported = 0;
