@@ -105,10 +105,10 @@ const DataKind& kind_of_data(const std::string& option, const fs::path& data) {
                     "--trajectories DIR/FILE.csv",
                     option, data.string(), data.string()));
   }
-  throw UserError(
-      fmt::format("{} {}: {}; expected {}, or ARK logs (*.tsv, *.txt, *.log), or files of kilotwin "
-                  "export --trajectories",
-                  option, data.string(), contents_of(data), kExpected));
+  throw UserError(fmt::format(
+      "{} {}: {}; expected {}, or ARK logs (*.tsv, *.txt, *.log), or files of kilotwin "
+      "export --trajectories, or tables of kilotwin track; state the columns of other tables with --columns",
+      option, data.string(), contents_of(data), kExpected));
 }
 
 }  // namespace kilotwin::cli

@@ -1,7 +1,6 @@
 #include "clients/cli/identify/design_command.hpp"
 
 #include <fmt/format.h>
-#include <google/protobuf/text_format.h>
 
 #include <algorithm>
 #include <charconv>
@@ -10,9 +9,12 @@
 
 #include "clients/cli/commands.hpp"
 #include "clients/cli/identify/design_report.hpp"
+#include "clients/cli/identify/unfinished.hpp"
 #include "clients/cli/progress.hpp"
 #include "clients/identify/result/result_file.hpp"
 #include "core/base/error.hpp"
+#include "core/experiment/load.hpp"
+#include "core/experiment/validate.hpp"
 #include "core/os/files.hpp"
 
 namespace kilotwin::cli {
@@ -23,10 +25,19 @@ namespace {
 constexpr double kShortest_s = 10, kLongest_s = 1800;
 constexpr std::uint32_t kMostRobots = 200;
 
+/// A model file that passes the checks of `kilotwin run --model`.
 proto::Model read_model(const fs::path& file) {
   proto::Model model;
-  if (!google::protobuf::TextFormat::ParseFromString(os::read_file(file), &model))
-    throw UserError(fmt::format("{}: is no model file; kilotwin identify writes one", file.string()));
+  SourceLocations locations(file.string());
+  parse_text(file.string(), read_text(file, file.string()), model, locations);
+  LoadedExperiment loaded{{}, "planned.txtpb", SourceLocations("planned.txtpb")};
+  loaded.experiment.set_name("planned");
+  loaded.experiment.set_duration_s(kShortest_s);
+  loaded.experiment.mutable_arena()->set_width_mm(1000);
+  loaded.experiment.mutable_arena()->set_height_mm(1000);
+  loaded.experiment.add_robots()->set_count(1);
+  apply_model(loaded, file);
+  validate(loaded);
   return model;
 }
 
@@ -63,7 +74,8 @@ identify::PlanArena arena_of(const DesignArguments& arguments, const identificat
     const bool wide = error == std::errc() && cross != end && *cross == 'x';
     const auto [last, failed] =
         wide ? std::from_chars(cross + 1, end, arena.height_mm) : std::from_chars(end, end, arena.height_mm);
-    if (!wide || failed != std::errc() || last != end)
+    if (!wide || failed != std::errc() || last != end || !std::isfinite(arena.width_mm) ||
+        !std::isfinite(arena.height_mm))
       throw UserError(fmt::format("--arena: is \"{}\"; give width and height in mm: 1000x800", arguments.arena));
   }
   constexpr double kSmallest_mm = 200, kLargest_mm = 100'000;
@@ -137,14 +149,22 @@ int plan_recording(const DesignArguments& arguments, const Output& output) {
       models.size() == 1 ? identify::question_of_parameters(models.front().second, result)
                          : identify::question_of_models(models, result, options.duration_s, reach_mm);
   const identify::RecordingConditions conditions = conditions_of(arguments, result);
-  const fs::path fallback = "planned", out = make_plain_output(output, fallback, {arguments.result});
+  std::vector<fs::path> inputs = arguments.contenders;
+  inputs.push_back(arguments.result);
+  const fs::path fallback = "planned", out = make_plain_output(output, fallback, inputs);
+  Unfinished unfinished(out);
   std::optional<Progress> progress(std::in_place, !arguments.quiet);
   options.progress = [&](double share, const std::string& what) { progress->show(share, what, what); };
   const identify::Design design = design_recording(question, conditions, options);
   write_plan(design.plan, arguments.every_s, out);
   write_design_report(design, question, models.front().first, out);
+  unfinished.keep();
   progress.reset();
   if (!arguments.quiet) {
+    if (!fits_robots(design.plan))
+      fmt::print(
+          "note: planned.c has too many commands for a robot's memory; it is for simulated robots alone. "
+          "For real ones give fewer --robots or a shorter --duration\n");
     for (std::size_t m = 1; m < models.size(); ++m) fmt::print("contender: {}\n", models[m].first);
     fmt::print("{}\nplan {}: commands.csv, planned.txtpb, planned.c, planned-poses.csv, design.json, report.html\n",
                design_in_words(design, question), place_in_words(out, output, fallback));

@@ -10,6 +10,7 @@
 #include "clients/cli/commands.hpp"
 #include "clients/cli/identify/data_kinds.hpp"
 #include "clients/cli/identify/design_command.hpp"
+#include "clients/cli/identify/unfinished.hpp"
 #include "clients/cli/output.hpp"
 #include "clients/cli/progress.hpp"
 #include "clients/identify/data/measured_set.hpp"
@@ -46,22 +47,6 @@ std::string csv_of(const std::vector<identify::Prediction>& predictions) {
   }
   return text;
 }
-
-/// Removes the directory unless it is kept: a command that fails leaves no files.
-class Unfinished {
- public:
-  explicit Unfinished(fs::path directory) : directory_(std::move(directory)) {}
-  ~Unfinished() {
-    std::error_code ignored;
-    if (!kept_) fs::remove_all(directory_, ignored);
-  }
-  Unfinished(const Unfinished&) = delete;
-  void keep() { kept_ = true; }
-
- private:
-  fs::path directory_;
-  bool kept_ = false;
-};
 
 void print_errors(const identification::Result& result) {
   if (!result.before().rmse_mm().has_number_value()) {
@@ -128,16 +113,48 @@ void write_contenders(std::vector<std::pair<std::string, proto::Model>> contende
   }
 }
 
+/// Whether options state the format of tables.
+bool states_format(const IdentifyArguments& arguments) {
+  return !arguments.columns.empty() || arguments.unit_mm || arguments.angle != "rad" || arguments.frame != "plane";
+}
+
+/// What the data are of; both directories must hold the same. Throws UserError.
+const DataKind& checked_kind(const IdentifyArguments& arguments, const fs::path& train, const fs::path& test) {
+  const DataKind& kind = kind_of_data("--train", train);
+  if (!arguments.test.empty() && &kind_of_data("--test", test) != &kind)
+    throw UserError(fmt::format("--test {}: does not hold {}; give the same kind of data as --train",
+                                arguments.test.string(), kind.name));
+  if (arguments.draws > 0 && !kind.has_draws)
+    throw UserError(fmt::format(
+        "--draws: models are drawn from the posterior of a fit to trajectories, and {} holds other data; leave out "
+        "--draws",
+        arguments.train.string()));
+  return kind;
+}
+
+/// What can be checked before --force removes an older result.
+void check_inputs(const IdentifyArguments& arguments) {
+  if (!states_format(arguments)) {
+    checked_kind(arguments, arguments.train, arguments.test);
+    return;
+  }
+  for (const auto& [option, data] : {std::pair("--train", &arguments.train), std::pair("--test", &arguments.test)})
+    if (!data->empty() && !fs::is_directory(*data))
+      throw UserError(fmt::format("{} {}: is no directory; name one that holds tables", option, data->string()));
+}
+
 /// The directory of data, or its tables under the names, units and axes that the options state.
 fs::path converted(const IdentifyArguments& arguments, const fs::path& data, const fs::path& to) {
-  const bool states =
-      !arguments.columns.empty() || arguments.unit_mm || arguments.angle != "rad" || arguments.frame != "plane";
-  if (data.empty() || !states) return data;
-  if (!fs::is_directory(data)) throw UserError(fmt::format("{}: is no directory of tables", data.string()));
+  if (data.empty() || !states_format(arguments)) return data;
   identify::TableFormat format;
   if (identify::has_trajectories(data)) format.run = "run";
   if (!arguments.columns.empty()) identify::set_columns(format, arguments.columns);
-  if (arguments.columns.empty() && identify::has_headings(data)) format.heading = "heading_rad";
+  if (format.heading.empty() && identify::has_headings(data)) format.heading = "heading_rad";
+  if (format.heading.empty() && arguments.angle == "deg")
+    throw UserError(
+        fmt::format("--angle deg: {} has no column heading_rad; name the column of headings: "
+                    "--columns heading=NAME",
+                    data.string()));
   format.unit_mm = arguments.unit_mm.value_or(1);
   format.degrees = arguments.angle == "deg";
   format.image = arguments.frame == "image";
@@ -148,21 +165,14 @@ fs::path converted(const IdentifyArguments& arguments, const fs::path& data, con
 int identify_data(const IdentifyArguments& arguments) {
   if (!(arguments.horizon_s > 0)) throw UserError("--horizon: give a number of seconds above 0");
   warn_beyond_cores("--threads", arguments.threads);
+  check_inputs(arguments);
   const fs::path fallback = "identified";
   const fs::path out = make_plain_output(arguments.output, fallback, {arguments.train, arguments.test});
   Unfinished unfinished(out);
   // Tables of other trackers become files that the command reads.
   const fs::path train = converted(arguments, arguments.train, out / "imported-train"),
                  test = converted(arguments, arguments.test, out / "imported-test");
-  const DataKind& kind = kind_of_data("--train", train);
-  if (!arguments.test.empty() && &kind_of_data("--test", test) != &kind)
-    throw UserError(fmt::format("--test {}: does not hold {}; give the same kind of data as --train",
-                                arguments.test.string(), kind.name));
-  if (arguments.draws > 0 && !kind.has_draws)
-    throw UserError(fmt::format(
-        "--draws: models are drawn from the posterior of a fit to trajectories, and {} holds other data; leave out "
-        "--draws",
-        arguments.train.string()));
+  const DataKind& kind = checked_kind(arguments, train, test);
   identify::Options options;
   options.horizon_s = arguments.horizon_s;
   options.threads = arguments.threads;
@@ -199,6 +209,9 @@ int identify_data(const IdentifyArguments& arguments) {
 constexpr std::array kDesignOptions = {"--contender", "--duration", "--robots",     "--arena",
                                        "--every",     "--seed",     "--no-headings"};
 
+/// Options of data, which a plan refuses.
+constexpr std::array kDataOptions = {"--horizon", "--draws", "--columns", "--unit-mm", "--angle", "--frame"};
+
 void add_design_options(CLI::App& app, DesignArguments& design) {
   app.add_option(
          "--design", design.result,
@@ -229,6 +242,9 @@ int identify_or_plan(IdentifyArguments& arguments, const CLI::App& app) {
   if (plans) {
     if (!arguments.train.empty() || !arguments.test.empty())
       throw UserError("--design: plans from a result; leave out --train and --test");
+    for (const char* option : kDataOptions)
+      if (app.count(option) > 0) throw UserError(fmt::format("{}: belongs to --train; leave it out", option));
+    warn_beyond_cores("--threads", arguments.threads);
     arguments.design.threads = arguments.threads;
     arguments.design.quiet = arguments.quiet;
     return plan_recording(arguments.design, arguments.output);

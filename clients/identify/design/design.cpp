@@ -1,5 +1,7 @@
 #include "clients/identify/design/design.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -80,6 +82,16 @@ std::vector<PlannedCommand> commands_of(const Style& style, std::int64_t end, Dr
   return commands;
 }
 
+/// Distance from a place to the nearest other robot's start, of the first `others` robots.
+double nearest_mm(const RecordingPlan& plan, std::size_t r, double x_mm, double y_mm,
+                  std::size_t others = std::numeric_limits<std::size_t>::max()) {
+  double nearest_mm = std::numeric_limits<double>::infinity();
+  for (std::size_t o = 0; o < std::min(others, plan.robots.size()); ++o)
+    if (o != r)
+      nearest_mm = std::min(nearest_mm, std::hypot(plan.robots[o].x_mm - x_mm, plan.robots[o].y_mm - y_mm));
+  return nearest_mm;
+}
+
 /// Starts the robot somewhere, away from walls and from where the others start.
 void place_anywhere(RecordingPlan& plan, std::size_t r, std::size_t others, Draws& draws) {
   const double half_x = std::max(1.0, plan.arena.width_mm / 2 - kFromWall_mm),
@@ -89,11 +101,9 @@ void place_anywhere(RecordingPlan& plan, std::size_t r, std::size_t others, Draw
   constexpr int kTries = 30;
   for (int n = 0; n < kTries && most_mm < kApart_mm; ++n) {
     const double x = draws.uniform(-half_x, half_x), y = draws.uniform(-half_y, half_y);
-    double nearest_mm = std::numeric_limits<double>::infinity();
-    for (std::size_t o = 0; o < others; ++o)
-      if (o != r) nearest_mm = std::min(nearest_mm, std::hypot(plan.robots[o].x_mm - x, plan.robots[o].y_mm - y));
-    if (nearest_mm <= most_mm) continue;
-    most_mm = nearest_mm;
+    const double at_mm = nearest_mm(plan, r, x, y, others);
+    if (at_mm <= most_mm) continue;
+    most_mm = at_mm;
     robot.x_mm = x;
     robot.y_mm = y;
   }
@@ -107,10 +117,7 @@ void place_beside(RecordingPlan& plan, std::size_t r, Draws& draws) {
   for (int n = 0; n < 10; ++n) {
     const double angle = draws.uniform(-M_PI, M_PI), distance_mm = draws.uniform(45, 140);
     const double x = other.x_mm + distance_mm * std::cos(angle), y = other.y_mm + distance_mm * std::sin(angle);
-    const bool free = std::none_of(plan.robots.begin(), plan.robots.end(), [&](const PlannedRobot& o) {
-      return o.robot != plan.robots[r].robot && std::hypot(o.x_mm - x, o.y_mm - y) < kTouching_mm;
-    });
-    if (!free || std::abs(x) > half_x || std::abs(y) > half_y) continue;
+    if (nearest_mm(plan, r, x, y) < kTouching_mm || std::abs(x) > half_x || std::abs(y) > half_y) continue;
     plan.robots[r].x_mm = x;
     plan.robots[r].y_mm = y;
     return;
@@ -296,6 +303,8 @@ class Exchange {
   }
   void accept_each(const RecordingPlan& trial, const std::vector<Products>& products, const PlanTracks& tracks) {
     for (std::size_t r = 0; r < products.size(); ++r) {
+      // The others may have kept their former places.
+      if (nearest_mm(plan_, r, trial.robots[r].x_mm, trial.robots[r].y_mm) < kTouching_mm) continue;
       Products total = total_;
       add(total, products_[r], -1);
       add(total, products[r]);
@@ -368,6 +377,10 @@ RecordingPlan random_plan(const DesignOptions& options, std::uint32_t number) {
     Draws draws(options.seed, r, -1 - static_cast<std::int64_t>(number));
     plan.robots[r].robot = r;
     place_anywhere(plan, r, r, draws);
+    if (nearest_mm(plan, r, plan.robots[r].x_mm, plan.robots[r].y_mm, r) < kTouching_mm)
+      throw UserError(
+          fmt::format("--robots: {} do not fit into {:g} mm by {:g} mm; give fewer, or a larger --arena",
+                      options.robots, options.arena.width_mm, options.arena.height_mm));
     plan.robots[r].commands = commands_of(kRandomStyle, plan.ticks, draws);
   }
   return plan;

@@ -54,6 +54,14 @@ std::string poses_csv(const RecordingPlan& plan) {
   return text;
 }
 
+bool fits_robots(const RecordingPlan& plan) {
+  // 4 KiB are for the library and the program itself.
+  constexpr std::size_t kMostOctets = 24 * 1024, kOctets = 3;
+  std::size_t commands = 0;
+  for (const PlannedRobot& robot : plan.robots) commands += robot.commands.size();
+  return commands * kOctets <= kMostOctets;
+}
+
 std::string program_c(const RecordingPlan& plan) {
   std::string from = "0", steps;
   std::size_t count = 0;
@@ -84,9 +92,9 @@ typedef struct {{
 static const command_t commands[] PROGMEM = {{{}
   {{0, STOP}}}};
 /* First command of each robot, and the end. */
-static const uint16_t first[ROBOTS + 1] PROGMEM = {{{}}};
+static const uint32_t first[ROBOTS + 1] PROGMEM = {{{}}};
 
-static uint16_t next, end;
+static uint32_t next, end;
 static uint32_t start;
 
 static void drive(uint8_t motion) {{
@@ -102,8 +110,8 @@ static void drive(uint8_t motion) {{
 static void setup(void) {{
   start = kilo_ticks - SETUP_TICK;
   if (kilo_uid >= ROBOTS) return;
-  next = pgm_read_word(&first[kilo_uid]);
-  end = pgm_read_word(&first[kilo_uid + 1]);
+  next = pgm_read_dword(&first[kilo_uid]);
+  end = pgm_read_dword(&first[kilo_uid + 1]);
 }}
 
 static void loop(void) {{

@@ -50,6 +50,8 @@ void overwrite(std::vector<PlannedCommand>& commands, std::int64_t from, std::in
 [[nodiscard]] std::string poses_csv(const RecordingPlan&);
 /// A C program for simulated and real robots: robot N follows the commands of the N-th planned robot.
 [[nodiscard]] std::string program_c(const RecordingPlan&);
+/// Whether that program fits a robot: a command takes 3 octets of the flash, which has 28 KiB below the boot loader.
+[[nodiscard]] bool fits_robots(const RecordingPlan&);
 /// The experiment that plays the plan; `program` and `poses` are files beside it.
 [[nodiscard]] std::string experiment_text(const RecordingPlan&, const std::string& name, const std::string& program,
                                           const std::string& poses, double every_s);

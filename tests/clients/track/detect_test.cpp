@@ -11,7 +11,7 @@
 namespace kilotwin::track {
 namespace {
 
-struct Condition {
+struct DiscCondition {
   const char* name;
   double radius_px, noise, uneven;
   bool touching;
@@ -21,14 +21,14 @@ struct Condition {
   double error_radii;  ///< root mean square of the centre's error, in radii
 };
 
-std::ostream& operator<<(std::ostream& out, const Condition& c) {
+std::ostream& operator<<(std::ostream& out, const DiscCondition& c) {
   return out << c.name << " radius " << c.radius_px;
 }
 
-class Detect : public testing::TestWithParam<Condition> {};
+class Detect : public testing::TestWithParam<DiscCondition> {};
 
 TEST_P(Detect, FindsTheDiscs) {
-  const Condition& c = GetParam();
+  const DiscCondition& c = GetParam();
   DrawnScene scene;
   const double zoom = c.radius_px < 12 ? 1 : c.radius_px < 30 ? 1.6 : 2.6;
   scene.width_px = cvRound(560 * zoom);
@@ -58,16 +58,16 @@ TEST_P(Detect, FindsTheDiscs) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Conditions, Detect,
-                         testing::Values(Condition{"noise", 8, 8, 0, false, 0, 1, 0, 0.03},
-                                         Condition{"noise", 20, 8, 0, false, 0, 1, 0, 0.02},
-                                         Condition{"noise", 60, 8, 0, false, 0, 1, 0, 0.02},
-                                         Condition{"uneven light", 8, 2, 0.3, false, 0, 1, 0, 0.03},
-                                         Condition{"uneven light", 20, 2, 0.3, false, 0, 1, 0, 0.02},
-                                         Condition{"touching", 8, 2, 0.2, true, 0, 0.85, 2, 0.08},
-                                         Condition{"touching", 12, 2, 0.2, true, 0, 0.97, 0, 0.03},
-                                         Condition{"touching", 24, 2, 0.2, true, 0, 0.97, 0, 0.03},
-                                         Condition{"clutter", 12, 3, 0.2, false, 20, 0.97, 1, 0.03},
-                                         Condition{"clutter", 24, 3, 0.2, false, 20, 0.97, 1, 0.03}));
+                         testing::Values(DiscCondition{"noise", 8, 8, 0, false, 0, 1, 0, 0.03},
+                                         DiscCondition{"noise", 20, 8, 0, false, 0, 1, 0, 0.02},
+                                         DiscCondition{"noise", 60, 8, 0, false, 0, 1, 0, 0.02},
+                                         DiscCondition{"uneven light", 8, 2, 0.3, false, 0, 1, 0, 0.03},
+                                         DiscCondition{"uneven light", 20, 2, 0.3, false, 0, 1, 0, 0.02},
+                                         DiscCondition{"touching", 8, 2, 0.2, true, 0, 0.85, 2, 0.08},
+                                         DiscCondition{"touching", 12, 2, 0.2, true, 0, 0.97, 0, 0.03},
+                                         DiscCondition{"touching", 24, 2, 0.2, true, 0, 0.97, 0, 0.03},
+                                         DiscCondition{"clutter", 12, 3, 0.2, false, 20, 0.97, 1, 0.03},
+                                         DiscCondition{"clutter", 24, 3, 0.2, false, 20, 0.97, 1, 0.03}));
 
 TEST(DetectNothing, IsFoundWhereThereIsNothing) {
   DrawnScene scene;

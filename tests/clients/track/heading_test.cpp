@@ -62,7 +62,7 @@ TEST(Headings, ALedReadingGivesItAtRest) {
   EXPECT_NEAR(filter.heading()->heading_rad, 2.0, 0.02);
 }
 
-struct Condition {
+struct TurnCondition {
   double sd_mm, step_s;
   double half_mm = 1e9;  ///< half the side of the arena: its walls hold discs, and do not turn them
   bool led = false;      ///< the LED gives the heading, too
@@ -77,7 +77,7 @@ bool held(Robot& robot, double half_mm) {
   return dx != 0 || dy != 0;
 }
 
-class HeadingOf : public testing::TestWithParam<Condition> {};
+class HeadingOf : public testing::TestWithParam<TurnCondition> {};
 
 TEST_P(HeadingOf, IsWithinFiveDegreesAfterStraightMotionAndTenOverall) {
   const auto [sd_mm, step_s, half_mm, led] = GetParam();
@@ -134,9 +134,10 @@ TEST_P(HeadingOf, IsWithinFiveDegreesAfterStraightMotionAndTenOverall) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Conditions, HeadingOf,
-                         testing::Values(Condition{0.1, 1 / 30.0}, Condition{0.3, 1 / 30.0}, Condition{0.3, 0.1},
-                                         Condition{0.6, 1 / 30.0}, Condition{0.1, 1 / 30.0, 150, true},
-                                         Condition{0.3, 1 / 30.0, 150, true}));
+                         testing::Values(TurnCondition{0.1, 1 / 30.0}, TurnCondition{0.3, 1 / 30.0},
+                                         TurnCondition{0.3, 0.1}, TurnCondition{0.6, 1 / 30.0},
+                                         TurnCondition{0.1, 1 / 30.0, 150, true},
+                                         TurnCondition{0.3, 1 / 30.0, 150, true}));
 
 /// Robots that others push jump by many times the stated error. No hypothesis may run away: wrapped() would not return.
 TEST(Headings, StayBoundedWherePositionsJump) {

@@ -13,8 +13,8 @@ namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kSmallest = std::numeric_limits<double>::denorm_min();
-constexpr double kMax = std::numeric_limits<double>::max();
+constexpr double kLeast = std::numeric_limits<double>::denorm_min();
+constexpr double kMost = std::numeric_limits<double>::max();
 
 std::uint64_t bits(double x) { return std::bit_cast<std::uint64_t>(x); }
 
@@ -73,8 +73,8 @@ TEST(Special, Circle) {
   EXPECT_EQ(kt_cos(0.0), 1);
   EXPECT_EQ(kt_sin(M_PI / 2), 1);
   EXPECT_EQ(kt_cos(M_PI), -1);
-  EXPECT_EQ(kt_sin(kSmallest), kSmallest);
-  EXPECT_EQ(kt_tan(-kSmallest), -kSmallest);
+  EXPECT_EQ(kt_sin(kLeast), kLeast);
+  EXPECT_EQ(kt_tan(-kLeast), -kLeast);
   EXPECT_EQ(kt_asin(1), M_PI / 2);
   EXPECT_EQ(kt_asin(-1), -M_PI / 2);
   EXPECT_EQ(kt_acos(-1), M_PI);
@@ -98,7 +98,7 @@ TEST(Special, SincosAgreesWithSineAndCosine) {
 
 TEST(Special, AngleOfAPointAgreesWithTheStandard) {
   // IEEE 754 fixes these results, so libm is a reference for every bit, except for the rounding of multiples of pi/4.
-  const double values[] = {0.0, -0.0, 1, -1, 3, -3, kInf, -kInf, kSmallest, -kSmallest, kMax, -kMax};
+  const double values[] = {0.0, -0.0, 1, -1, 3, -3, kInf, -kInf, kLeast, -kLeast, kMost, -kMost};
   for (const double y : values) {
     for (const double x : values) {
       const double expected = std::atan2(y, x);
@@ -115,19 +115,19 @@ TEST(Special, ExponentialAndLogarithm) {
   EXPECT_BITS(kt_exp(-kInf), 0.0);
   EXPECT_EQ(kt_exp(0x1.62e42fefa39efp+9), 0x1.fffffffffff2ap+1023);
   EXPECT_EQ(kt_exp(0x1.62e42fefa39fp+9), kInf);
-  EXPECT_EQ(kt_exp(-0x1.74910d52d3051p+9), kSmallest);
+  EXPECT_EQ(kt_exp(-0x1.74910d52d3051p+9), kLeast);
   EXPECT_BITS(kt_exp(-745.2), 0.0);
   EXPECT_EQ(kt_log(0.0), -kInf);
   EXPECT_EQ(kt_log(-0.0), -kInf);
   EXPECT_EQ(kt_log(kInf), kInf);
-  EXPECT_EQ(kt_log(kMax), 0x1.62e42fefa39efp+9);
+  EXPECT_EQ(kt_log(kMost), 0x1.62e42fefa39efp+9);
   EXPECT_EQ(kt_log(2), 0x1.62e42fefa39efp-1);
 }
 
 TEST(Special, PowerAgreesWithTheStandard) {
-  const double values[] = {0.0,   -0.0,   0.5,       -0.5,       1,      -1,      2,
-                           -2,    3,      -3,        2.5,        -2.5,   kInf,    -kInf,
-                           1e300, -1e300, kSmallest, -kSmallest, 0x1p53, -0x1p53, 9007199254740991.0};
+  const double values[] = {0.0,   -0.0,   0.5,    -0.5,    1,      -1,      2,
+                           -2,    3,      -3,     2.5,     -2.5,   kInf,    -kInf,
+                           1e300, -1e300, kLeast, -kLeast, 0x1p53, -0x1p53, 9007199254740991.0};
   for (const double x : values) {
     for (const double y : values) {
       const double expected = std::pow(x, y);
@@ -152,13 +152,13 @@ TEST(Special, FloorRemainderHypotenuse) {
   EXPECT_EQ(kt_floor(kInf), kInf);
   EXPECT_EQ(kt_fmod(5, kInf), 5);
   EXPECT_EQ(kt_fmod(-5.5, 2), -1.5);
-  EXPECT_EQ(kt_fmod(kMax, kSmallest), 0);
-  EXPECT_EQ(kt_fmod(3 * kSmallest, 2 * kSmallest), kSmallest);
+  EXPECT_EQ(kt_fmod(kMost, kLeast), 0);
+  EXPECT_EQ(kt_fmod(3 * kLeast, 2 * kLeast), kLeast);
   EXPECT_EQ(kt_hypot(3, -4), 5);
   EXPECT_EQ(kt_hypot(0.0, -0.0), 0);
   EXPECT_EQ(kt_hypot(-kInf, kNan), kInf);
-  EXPECT_EQ(kt_hypot(kSmallest, 0), kSmallest);
-  EXPECT_EQ(kt_hypot(kMax, kMax), kInf);
+  EXPECT_EQ(kt_hypot(kLeast, 0), kLeast);
+  EXPECT_EQ(kt_hypot(kMost, kMost), kInf);
   EXPECT_EQ(kt_hypot(3e300, 4e300), 5e300);
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "tests/identify/truth/dice.hpp"
 #include "tests/identify/truth/world.hpp"
@@ -14,7 +15,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kPi = 3.14159265358979323846;
 // Number of heading hypotheses without measured headings.
 constexpr int kDirections = 18;
 // Hypotheses with a lower relative likelihood are pruned.
@@ -103,8 +103,9 @@ class Belief {
   void start(const Sample& sample) {
     const int count = scene_.heading ? 1 : kDirections;
     for (int k = 0; k < count; ++k) {
-      const double heading = scene_.heading ? sample.heading_rad : -kPi + 2 * kPi * (k + 0.5) / count;
-      const double sd = scene_.heading ? 0.3 : 2 * kPi / count / 2;
+      const double heading =
+          scene_.heading ? sample.heading_rad : -std::numbers::pi + 2 * std::numbers::pi * (k + 0.5) / count;
+      const double sd = scene_.heading ? 0.3 : 2 * std::numbers::pi / count / 2;
       const Vec ahead{std::cos(heading), std::sin(heading)};
       Guess guess{{sample.point.x - scene_.tracked_ahead_mm * ahead.x,
                    sample.point.y - scene_.tracked_ahead_mm * ahead.y, heading},
@@ -132,7 +133,7 @@ class Belief {
     const Matrix3d noise = Vector3d{position, position, heading}.asDiagonal();
     const Vector3d expected = look(guess.mean);
     Vector3d surprise{sample.point.x - expected.x(), sample.point.y - expected.y(),
-                      scene_.heading ? std::remainder(sample.heading_rad - expected.z(), 2 * kPi) : 0};
+                      scene_.heading ? std::remainder(sample.heading_rad - expected.z(), 2 * std::numbers::pi) : 0};
     const Matrix3d spread = slope * guess.covariance * slope.transpose() + noise;
     const Matrix3d gain = guess.covariance * slope.transpose() * spread.inverse();
     guess.log_weight -= 0.5 * (surprise.dot(spread.inverse() * surprise) + std::log(spread.determinant()));

@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "tests/identify/truth/dice.hpp"
 #include "tests/identify/truth/world.hpp"
 
 namespace kilotwin::truth {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 /// Times are whole milliseconds.
 double stamped(double time_s) { return std::round(time_s * 1000) / 1000; }
@@ -44,7 +43,7 @@ std::vector<Stance> draw_stances(const Scene& scene, Dice& dice) {
   std::vector<Vec> discs;
   while (stances.size() < static_cast<std::size_t>(scene.robots)) {
     const Stance stance{{dice.between(-0.5, 0.5) * width, dice.between(-0.5, 0.5) * height},
-                        dice.between(-kPi, kPi)};
+                        dice.between(-std::numbers::pi, std::numbers::pi)};
     const Vec disc = disc_of(scene, stance);
     const bool apart = std::all_of(discs.begin(), discs.end(), [&](Vec other) {
       return std::hypot(other.x - disc.x, other.y - disc.y) > 2.2 * kDiscRadius_mm;
@@ -92,7 +91,7 @@ Run play_run(const Scene& scene, const std::vector<Individual>& individuals, int
            robot,
            next_s,
            {view.point.x + scene.tracker_sd_mm * noise.x, view.point.y + scene.tracker_sd_mm * noise.y},
-           std::remainder(view.heading_rad + scene.heading_sd_rad * heading_noise, 2 * kPi)});
+           std::remainder(view.heading_rad + scene.heading_sd_rad * heading_noise, 2 * std::numbers::pi)});
     }
     if (next_s == mark_s) mark_s += kMarkInterval_s;
     if (next_s == sample_s)
@@ -133,7 +132,7 @@ void apply(const Fault& fault, Run& run, Dice& dice) {
     }
     case Fault::Kind::kOutliers:
       for (Sample& s : run.samples) {
-        const double angle = dice.between(-kPi, kPi), distance = dice.between(15, 300);
+        const double angle = dice.between(-std::numbers::pi, std::numbers::pi), distance = dice.between(15, 300);
         if (dice.uniform() >= fault.amount) continue;
         s.point.x += distance * std::cos(angle);
         s.point.y += distance * std::sin(angle);
