@@ -40,8 +40,8 @@ def built(arguments: argparse.Namespace, program: str) -> pathlib.Path:
 
 def data_of(arguments: argparse.Namespace, name: str) -> pathlib.Path:
     """A set of measured data."""
-    path = pathlib.Path(arguments.data) / name
-    if not path.exists():
+    path = pathlib.Path(arguments.data or "") / name
+    if not arguments.data or not path.exists():
         sys.exit(f"{path}: no measured data there; name their directory with --data")
     return path
 
@@ -89,8 +89,18 @@ def parser_of(doc: str) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(usage=doc.split("Usage: ")[1])
     parser.add_argument("-w", action="store_true")
     parser.add_argument("-b", default=str(ROOT / "build/release"))
-    parser.add_argument("--data", default=str(ROOT.parent / "shared/data"))
+    parser.add_argument("--data", metavar="DIR")
     return parser
+
+
+def command_of(program: str, name: str, arguments: argparse.Namespace, parser: argparse.ArgumentParser) -> str:
+    """The command that measures one part, with the options that were given. Measured data are named DATA."""
+    words = [program, "-w", name]
+    for option, value in vars(arguments).items():
+        if option in ("w", "b", "part") or value == parser.get_default(option):
+            continue
+        words += [("-" if len(option) == 1 else "--") + option.replace("_", "-"), "DATA" if option == "data" else str(value)]
+    return " ".join(words)
 
 
 def write(page_name: str, title: str, introduction: str, parts: dict[str, Part], parser: argparse.ArgumentParser) -> None:
@@ -105,7 +115,7 @@ def write(page_name: str, title: str, introduction: str, parts: dict[str, Part],
     for name in arguments.part or parts:
         part = parts[name]
         # The head first: it holds the load and the commit of the beginning.
-        text = head(part.heading, f"{program} -w {name}", part.timed) + "\n" + part.measure(arguments).strip("\n")
+        text = head(part.heading, command_of(program, name, arguments, parser), part.timed) + "\n" + part.measure(arguments).strip("\n")
         print(text + "\n", flush=True)
         if not arguments.w:
             continue

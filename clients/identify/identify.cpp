@@ -102,7 +102,7 @@ std::vector<Prediction> predictions_of(const Findings& f, const MeasuredSet& jud
 }
 
 /// The written model with an ambiguous effect exchanged for its alternative, refitted. The closest alternatives first.
-std::vector<std::pair<std::string, proto::Model>> contenders_of(const Findings& f, const Fitter& fitter) {
+std::vector<std::pair<std::string, proto::Model>> candidates_of(const Findings& f, const Fitter& fitter) {
   constexpr std::size_t kMost = 3;
   std::vector<Ambiguity> closest = f.found.ambiguous;
   std::stable_sort(closest.begin(), closest.end(), [](const Ambiguity& a, const Ambiguity& b) {
@@ -243,7 +243,7 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   say_progress(0.95, "simulation check");
   out.model = proto_of(f.found.fit.model);
   write_noise_effects(out.model, f.found.fit.model.noise, f.noise_effects);
-  out.contenders = contenders_of(f, fitter);
+  out.candidates = candidates_of(f, fitter);
   const PosteriorDraws posterior(f.found.fit.model, f.uncertainty);
   for (std::uint32_t n = 1; n <= options.draws; ++n) {
     out.draws.push_back(proto_of(posterior.draw(kDrawsSeed, n)));

@@ -31,7 +31,7 @@ struct Identified {
   std::vector<Prediction> predictions;
   std::vector<proto::Model> draws;
   /// Models that the data do not tell from `model`, by the name of the effect that differs.
-  std::vector<std::pair<std::string, proto::Model>> contenders;
+  std::vector<std::pair<std::string, proto::Model>> candidates;
 };
 
 /// Fits the tracks of `train` that are not held out. Predicts `test`; null: the held-out tracks of `train`.

@@ -209,7 +209,7 @@ class Sources {
       if (place.matched.isZero()) continue;
       chosen_[robot] = &place;
       const double with = gain();
-      if (with <= most) continue;
+      if (!(with > most)) continue;  // nor where it is no number
       most = with;
       best = &place;
     }
@@ -229,7 +229,7 @@ class Sources {
         if (apart(b, *its) > kClose) continue;
         chosen_[other] = &b;
         const double with = gain();
-        if (with <= most) continue;
+        if (!(with > most)) continue;  // nor where it is no number
         most = with;
         best_own = &a;
         best_its = &b;

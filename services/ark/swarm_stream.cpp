@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-#include "core/os/clocks.hpp"
+#include "core/base/clocks.hpp"
 #include "idl/manifest.pb.h"
 
 namespace kilotwin::ark {
@@ -61,7 +61,7 @@ void SwarmStream::write(const SwarmView& swarm) {
   state.run = plan_.run();
   state.tick = swarm.tick.count();
   state.time_s = plan_.tick_length.seconds_at(swarm.tick);
-  state.wall_ns = os::utc_ns();
+  state.wall_ns = utc_ns();
   borrow(state.x_mm, swarm.x_mm);
   borrow(state.y_mm, swarm.y_mm);
   borrow(state.heading_rad, swarm.heading_rad);

@@ -322,6 +322,7 @@ class Deployments : public testing::Test {
                                    "3", "--blur", "0.7", "--uneven-light", "0.2"});
   }
   std::unique_ptr<Process> start_tracker(const Words& more = {}) {
+    fs::remove(scratch_ / "robots.csv");  // of an attempt before
     Words words{"track",
                 scratch_ / "ceiling.jpg",
                 "--watch",

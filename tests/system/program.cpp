@@ -50,7 +50,13 @@ bool Process::running() {
 }
 
 bool Process::says(const std::string& text, double seconds) const {
-  return eventually([&] { return read(err_).find(text) != std::string::npos; }, seconds);
+  const auto has_ended = [this] {
+    siginfo_t state{};
+    return ended_ || (waitid(P_PID, static_cast<id_t>(process_), &state, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+                      state.si_pid != 0);
+  };
+  const auto has_said = [&] { return read(err_).find(text) != std::string::npos; };
+  return eventually([&] { return has_ended() || has_said(); }, seconds) && has_said();
 }
 
 Outcome Process::wait(double seconds) {

@@ -35,18 +35,20 @@ proto::Model read_model(const fs::path& file) {
   loaded.experiment.set_duration_s(kShortest_s);
   loaded.experiment.mutable_arena()->set_width_mm(1000);
   loaded.experiment.mutable_arena()->set_height_mm(1000);
-  loaded.experiment.add_robots()->set_count(1);
+  proto::RobotGroup& group = *loaded.experiment.add_robots();
+  group.set_count(1);
+  group.add_behaviour("planned.c");
   apply_model(loaded, file);
   validate(loaded);
   return model;
 }
 
-/// The present model and its contenders, by file.
+/// The present model and its candidates, by file.
 std::vector<std::pair<std::string, proto::Model>> models_of(const DesignArguments& arguments) {
-  std::vector<fs::path> files = arguments.contenders;
+  std::vector<fs::path> files = arguments.candidates;
   std::error_code ignored;
   if (files.empty()) {
-    for (const fs::directory_entry& entry : fs::directory_iterator(arguments.result / "contenders", ignored))
+    for (const fs::directory_entry& entry : fs::directory_iterator(arguments.result / "candidates", ignored))
       if (entry.path().extension() == ".txtpb") files.push_back(entry.path());
     std::sort(files.begin(), files.end());
   }
@@ -149,7 +151,7 @@ int plan_recording(const DesignArguments& arguments, const Output& output) {
       models.size() == 1 ? identify::question_of_parameters(models.front().second, result)
                          : identify::question_of_models(models, result, options.duration_s, reach_mm);
   const identify::RecordingConditions conditions = conditions_of(arguments, result);
-  std::vector<fs::path> inputs = arguments.contenders;
+  std::vector<fs::path> inputs = arguments.candidates;
   inputs.push_back(arguments.result);
   const fs::path fallback = "planned", out = make_plain_output(output, fallback, inputs);
   Unfinished unfinished(out);
@@ -165,7 +167,7 @@ int plan_recording(const DesignArguments& arguments, const Output& output) {
       fmt::print(
           "note: planned.c has too many commands for a robot's memory; it is for simulated robots alone. "
           "For real ones give fewer --robots or a shorter --duration\n");
-    for (std::size_t m = 1; m < models.size(); ++m) fmt::print("contender: {}\n", models[m].first);
+    for (std::size_t m = 1; m < models.size(); ++m) fmt::print("candidate: {}\n", models[m].first);
     fmt::print("{}\nplan {}: commands.csv, planned.txtpb, planned.c, planned-poses.csv, design.json, report.html\n",
                design_in_words(design, question), place_in_words(out, output, fallback));
     fmt::print(

@@ -12,7 +12,7 @@ namespace kilotwin::cli {
 
 struct DesignArguments {
   std::filesystem::path result;  ///< directory of a result of `identify`
-  std::vector<std::filesystem::path> contenders;
+  std::vector<std::filesystem::path> candidates;
   double duration_s = 120, every_s = 0.5;
   std::uint32_t robots = 0;  ///< 0: as many as in the data
   std::string arena;         ///< WIDTHxHEIGHT, mm; empty: the walls of the result

@@ -24,7 +24,7 @@ nlohmann::ordered_json design_json(const Design& design, const DesignQuestion& q
                                    const std::string& source) {
   nlohmann::ordered_json json{{"source", source},
                               {"criterion", question.of_parameters() ? "D-optimality" : "T-optimality"}};
-  for (const identify::Contender& contender : question.models) json["models"].push_back(contender.name);
+  for (const identify::Candidate& candidate : question.models) json["models"].push_back(candidate.name);
   json["robots"] = design.plan.robots.size();
   json["duration_s"] = design.plan.duration_s();
   json["information_nat"] = design.planned.nat.back();

@@ -1,4 +1,4 @@
-/// What a planned recording promises, as JSON and as a page.
+/// The promises of a planned recording, as JSON and as a page.
 #pragma once
 
 #include <filesystem>

@@ -100,12 +100,12 @@ void write_draws(std::vector<proto::Model> draws, const fs::path& train, const f
   }
 }
 
-/// Contenders as files that `--design` reads.
-void write_contenders(std::vector<std::pair<std::string, proto::Model>> contenders, const fs::path& train,
+/// Candidates as files that `--design` reads.
+void write_candidates(std::vector<std::pair<std::string, proto::Model>> candidates, const fs::path& train,
                       const fs::path& directory) {
-  if (contenders.empty()) return;
+  if (candidates.empty()) return;
   fs::create_directory(directory);
-  for (auto& [name, model] : contenders) {
+  for (auto& [name, model] : candidates) {
     clamp_to_ranges(model);
     const std::string remark = fmt::format(
         "Data of {} do not tell this model from model.txtpb: {} in place of another effect.", train.string(), name);
@@ -118,7 +118,7 @@ bool states_format(const IdentifyArguments& arguments) {
   return !arguments.columns.empty() || arguments.unit_mm || arguments.angle != "rad" || arguments.frame != "plane";
 }
 
-/// What the data are of; both directories must hold the same. Throws UserError.
+/// The kind of the data; both directories must hold the same. Throws UserError.
 const DataKind& checked_kind(const IdentifyArguments& arguments, const fs::path& train, const fs::path& test) {
   const DataKind& kind = kind_of_data("--train", train);
   if (!arguments.test.empty() && &kind_of_data("--test", test) != &kind)
@@ -132,7 +132,7 @@ const DataKind& checked_kind(const IdentifyArguments& arguments, const fs::path&
   return kind;
 }
 
-/// What can be checked before --force removes an older result.
+/// Checks of the inputs that are possible before --force removes an older result.
 void check_inputs(const IdentifyArguments& arguments) {
   if (!states_format(arguments)) {
     checked_kind(arguments, arguments.train, arguments.test);
@@ -191,7 +191,7 @@ int identify_data(const IdentifyArguments& arguments) {
   os::write_file(options.model_file,
                  identify::text_of(found.model, fmt::format("Identified from {}.", arguments.train.string())));
   write_draws(found.draws, arguments.train, out / "draws");
-  write_contenders(std::move(found.contenders), arguments.train, out / "contenders");
+  write_candidates(std::move(found.candidates), arguments.train, out / "candidates");
   os::write_file(out / "result.json", identify::json_of(found.found.result()).dump(2) + "\n");
   os::write_file(out / "predictions.csv", csv_of(found.predictions));
   identify::write_report(found.found, out / "report.html");
@@ -206,7 +206,7 @@ int identify_data(const IdentifyArguments& arguments) {
 }
 
 /// Options of the plan, which other uses of the command refuse.
-constexpr std::array kDesignOptions = {"--contender", "--duration", "--robots",     "--arena",
+constexpr std::array kDesignOptions = {"--candidate", "--duration", "--robots",     "--arena",
                                        "--every",     "--seed",     "--no-headings"};
 
 /// Options of data, which a plan refuses.
@@ -218,9 +218,9 @@ void add_design_options(CLI::App& app, DesignArguments& design) {
          "plan the next recording instead, from the result in this directory: commands and start places that "
          "answer most per minute")
       ->type_name("DIR");
-  app.add_option("--contender", design.contenders,
+  app.add_option("--candidate", design.candidates,
                  "with --design: a model that the recording is to tell from DIR/model.txtpb; repeatable (default: "
-                 "those in DIR/contenders; without any, the parameters of the model are in question)")
+                 "those in DIR/candidates; without any, the parameters of the model are in question)")
       ->allow_extra_args(false)
       ->type_name("FILE");
   app.add_option("--duration", design.duration_s, "with --design: length of the recording, s")

@@ -16,9 +16,9 @@
 #include "clients/cameras/renderer.hpp"
 #include "clients/cameras/scenes.hpp"
 #include "clients/cli/commands.hpp"
+#include "core/base/clocks.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
-#include "core/os/clocks.hpp"
 #include "core/os/files.hpp"
 #include "core/os/interrupt.hpp"
 #include "core/os/worker_pool.hpp"
@@ -145,7 +145,7 @@ class Live {
     const bool for_big = studio_->big() != nullptr && looked_at;
     const bool for_ark = directory_ && directory_->wants_pictures();
     if (!for_big && !for_ark) return;
-    if (!is_new_) stamp_.capture_ns = std::max(stamp_.capture_ns, os::utc_ns());
+    if (!is_new_) stamp_.capture_ns = std::max(stamp_.capture_ns, utc_ns());
     rate_.spend();
     if (for_big) take_big();
     if (for_ark) take_ark();

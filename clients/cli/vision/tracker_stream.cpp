@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "clients/track/led.hpp"
-#include "core/os/clocks.hpp"
+#include "core/base/clocks.hpp"
 
 namespace kilotwin::cli {
 
@@ -30,7 +30,7 @@ void TrackerStream::publish(std::uint64_t frame, std::int64_t capture_ns,
     }
     if (robot.led_known) one.led = track::bits_of(robot.led);
   }
-  sample.sent_ns = os::steady_ns();
+  sample.sent_ns = steady_ns();
   writer_.write(sample);
 }
 

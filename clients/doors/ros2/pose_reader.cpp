@@ -5,8 +5,8 @@
 #include <chrono>
 #include <cmath>
 
+#include "core/base/clocks.hpp"
 #include "core/base/pose.hpp"
-#include "core/os/clocks.hpp"
 
 namespace kilotwin::doors::ros2 {
 namespace {
@@ -127,7 +127,7 @@ template <class T> struct Readers::Of : Any {
       : reader(participant, channel<T>(topic.name, dds::Delivery::kSensor),
                [robot = topic.robot, index, &inbox](const T& sample, dds::SampleState state) {
                  if (!state.valid) return;
-                 const std::int64_t arrived_ns = os::utc_ns();
+                 const std::int64_t arrived_ns = utc_ns();
                  for (Message& message : read(sample, robot)) inbox.put({index, std::move(message), arrived_ns});
                }) {}
   dds::Reader<T> reader;

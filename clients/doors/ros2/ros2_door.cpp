@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "core/os/clocks.hpp"
+#include "core/base/clocks.hpp"
 
 namespace kilotwin::doors::ros2 {
 namespace {
@@ -46,16 +46,16 @@ Ros2Door::Ros2Door(Door door, const dds::Transport& run, const Discovery& ros)
 }
 
 void Ros2Door::serve(std::int64_t wait_ns) {
-  const std::int64_t end_ns = os::steady_ns() + wait_ns;
-  for (std::int64_t now_ns = os::steady_ns(); now_ns < end_ns; now_ns = os::steady_ns()) {
+  const std::int64_t end_ns = steady_ns() + wait_ns;
+  for (std::int64_t now_ns = steady_ns(); now_ns < end_ns; now_ns = steady_ns()) {
     std::int64_t until_ns = std::min(end_ns, maker_.deadline_ns().value_or(end_ns));
     if (publisher_) until_ns = std::min(until_ns, now_ns + kPublishEvery_ns);
     const std::uint64_t lost_before = lost_;
     const std::vector<Inbox::Item> items = inbox_.take(until_ns, lost_);
     for (std::uint64_t i = lost_before; i < lost_; ++i)
       maker_.tally().left_out("messages that came faster than they were read");
-    for (const Inbox::Item& item : items) send(maker_.add(item, os::steady_ns()));
-    send(maker_.expire(os::steady_ns()));
+    for (const Inbox::Item& item : items) send(maker_.add(item, steady_ns()));
+    send(maker_.expire(steady_ns()));
     if (publisher_) publisher_->publish();
   }
 }
@@ -63,7 +63,7 @@ void Ros2Door::serve(std::int64_t wait_ns) {
 void Ros2Door::send(std::vector<TrackedFrame> frames) {
   for (TrackedFrame& frame : frames) {
     // Where the source's clock shows UTC, so does this machine's.
-    if (frame.utc) frame.sent_ns = os::utc_ns();
+    if (frame.utc) frame.sent_ns = utc_ns();
     writer_.write(frame);
   }
 }

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "clients/doors/ros2/messages.hpp"
-#include "core/os/clocks.hpp"
+#include "core/base/clocks.hpp"
 
 namespace kilotwin::doors::ros2 {
 namespace {
@@ -78,7 +78,7 @@ void RunPublisher::write_poses(const Snapshots::Snapshot& snapshot) {
   for (const Snapshots::Pose& pose : snapshot.poses)
     poses.push_back(pose_of(door_.placement.from_arena(pose.x_mm, pose.y_mm, pose.heading_rad)));
   PoseArray sample{};
-  sample.header.stamp = time_of(clock_ ? std::llround(snapshot.time_s * kRunNsPerS) : os::utc_ns());
+  sample.header.stamp = time_of(clock_ ? std::llround(snapshot.time_s * kRunNsPerS) : utc_ns());
   sample.header.frame_id = frame_id.data();
   sample.poses._length = sample.poses._maximum = static_cast<std::uint32_t>(poses.size());
   sample.poses._buffer = poses.data();

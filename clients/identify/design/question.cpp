@@ -109,20 +109,20 @@ std::string content_of(const Effect& effect) {
 }
 
 /// Adds the columns of the effects that distinguish a model.
-void add_own(DesignQuestion& question, Contender& contender, const std::vector<Effect>& own, double duration_s,
+void add_own(DesignQuestion& question, Candidate& candidate, const std::vector<Effect>& own, double duration_s,
              double reach_mm) {
   if (own.empty()) return;
-  contender.amplitude = {
-      add(question, {"amplitude, " + contender.name, kAmplitudeSd, kAmplitudeStep, more_of(own)})};
-  contender.fitted.push_back(contender.amplitude.front());
+  candidate.amplitude = {
+      add(question, {"amplitude, " + candidate.name, kAmplitudeSd, kAmplitudeStep, more_of(own)})};
+  candidate.fitted.push_back(candidate.amplitude.front());
   std::set<Function::Covariate> covariates;
   for (const Effect& effect : own)
     for (const Function& function : effect.function()) covariates.insert(function.of());
   for (const Function::Covariate covariate : covariates) {
     const auto range = range_of(covariate, duration_s, reach_mm);
     if (!range) continue;
-    contender.fitted.push_back(add(
-        question, {fmt::format("trend over {}, {}", Function::Covariate_Name(covariate), contender.name), kTrendSd,
+    candidate.fitted.push_back(add(
+        question, {fmt::format("trend over {}, {}", Function::Covariate_Name(covariate), candidate.name), kTrendSd,
                    kAmplitudeStep, more_of(with_trend(own, covariate, range->first, range->second))}));
   }
 }
@@ -207,9 +207,9 @@ DesignQuestion question_of_models(const std::vector<std::pair<std::string, proto
     const proto::Model quiet = without_tracker_noise(model);
     for (const Effect& effect : quiet.effect())
       if (holders[content_of(effect)] < models.size()) own.push_back(effect);
-    Contender contender{name, base, {}};
-    add_own(question, contender, own, duration_s, reach_mm);
-    question.models.push_back(std::move(contender));
+    Candidate candidate{name, base, {}};
+    add_own(question, candidate, own, duration_s, reach_mm);
+    question.models.push_back(std::move(candidate));
   }
   return question;
 }
@@ -223,9 +223,9 @@ double information_nat(const DesignQuestion& question, const Eigen::MatrixXd& pr
            0.5 * precision.array().log().sum();
   }
   double least = std::numeric_limits<double>::infinity();
-  const Contender& present = question.models.front();
+  const Candidate& present = question.models.front();
   for (std::size_t m = 1; m < question.models.size(); ++m) {
-    const Contender& rival = question.models[m];
+    const Candidate& rival = question.models[m];
     Eigen::VectorXd difference = Eigen::VectorXd::Zero(products.rows());
     for (const Eigen::Index a : rival.amplitude) difference[a] += 1;
     for (const Eigen::Index a : present.amplitude) difference[a] -= 1;

@@ -25,7 +25,7 @@ struct DesignColumn {
 };
 
 /// A model that may be true.
-struct Contender {
+struct Candidate {
   std::string name;
   std::vector<Eigen::Index> fitted;     ///< columns of its parameters
   std::vector<Eigen::Index> amplitude;  ///< the column of all its own effects; empty: it has none
@@ -34,7 +34,7 @@ struct Contender {
 struct DesignQuestion {
   proto::Model present;  ///< without the noise of the tracker
   std::vector<DesignColumn> columns;
-  std::vector<Contender> models;  ///< the present model first
+  std::vector<Candidate> models;  ///< the present model first
 
   [[nodiscard]] bool of_parameters() const { return models.size() == 1; }
 };

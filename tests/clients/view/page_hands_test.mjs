@@ -70,7 +70,7 @@ async function movesAndHandOvers() {
   const served = await serve([kilotwin, "run", standingExperiment(), "--pace", "1", "--partitions", "2x1", "--out", directory, "--view"]);
   const page = await open(served.address);
   await phase(page, "live: running");
-  assert.match(await text(page, "run-facts"), /partitions2 × 1margin of ghosts[1-9]\d* mm/);
+  await eventually("facts of the run", async () => /partitions2 × 1margin of ghosts[1-9]\d* mm/.test(await text(page, "run-facts")));
 
   // Messages, counters and variables are recorded for the page. Messages come with the metrics of the radio. The federates say what they do.
   await eventually("messages", async () => (await counter(page, "flights")) > 0);

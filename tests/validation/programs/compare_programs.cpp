@@ -89,7 +89,6 @@ std::vector<fs::path> chosen(const Arguments& arguments) {
 Row row_of(const PairSettings& settings, const fs::path& program, const fs::path& root, const Causes& causes) {
   Row row;
   row.name = program.lexically_relative(root).string();
-  row.cause = causes.of(row.name);
   std::array<Outcome, 2> outcomes;
   Comparison result;
   for (const int seeds : {1, kMoreSeeds, kMostSeeds}) {
@@ -99,17 +98,19 @@ Row row_of(const PairSettings& settings, const fs::path& program, const fs::path
       if (outcome.refusal.empty()) continue;
       row.verdict = fmt::format("{} does not run", avr ? "firmware" : "native");
       row.note = without(outcome.refusal, root);
+      row.cause = causes.of("refusal", row.name);
       row.known = !row.cause.empty();
       return row;
     }
     row.seeds = seeds;
     result = compare(outcomes[0], outcomes[1]);
-    if (result.event_exact || result.agrees || (seeds >= kMoreSeeds && !row.cause.empty())) break;
+    if (result.event_exact || result.agrees) break;
   }
   row.note = outcomes[0].warning;
   row.ran = true;
   row.agrees = result.agrees || result.event_exact;
-  row.known = !row.agrees && !row.cause.empty();
+  if (!row.agrees) row.cause = causes.of("difference", row.name);
+  row.known = !row.cause.empty();
   row.changes = fmt::format("{} of {}, {}", result.same_changes, result.native_changes, result.firmware_changes);
   row.verdict = result.event_exact    ? "event for event"
                 : result.within_tenth ? "alike"
@@ -118,7 +119,8 @@ Row row_of(const PairSettings& settings, const fs::path& program, const fs::path
                                       : "DIFFERS";
   if (result.event_exact || result.part <= 0) return row;
   row.detail = fmt::format("{}: {:.4g}, {:.4g}", result.measure, result.native, result.firmware);
-  if (!result.within_tenth) row.detail += fmt::format("; p = {:.2g}", result.p);
+  if (!result.within_tenth)
+    row.detail += fmt::format("; p {} {:.2g}", result.p * (kDivisions + 1) < 1.5 ? "<=" : "=", result.p);
   return row;
 }
 

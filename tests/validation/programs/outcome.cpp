@@ -49,7 +49,6 @@ std::vector<double> means_of_runs(const std::vector<double>& values, std::size_t
 }  // namespace
 
 double permutation_p(std::span<const double> a, std::span<const double> b) {
-  constexpr int kDivisions = 9999;
   constexpr double kRounding = 1e-9;
   std::vector<double> all(a.begin(), a.end());
   all.insert(all.end(), b.begin(), b.end());

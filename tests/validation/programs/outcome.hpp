@@ -28,6 +28,9 @@ struct Outcome {
   std::int64_t last_tick = 0;
 };
 
+/// Divisions of the permutation test; no p is below 1 / (kDivisions + 1).
+inline constexpr int kDivisions = 9999;
+
 /// Two-sample permutation test of the difference of means (Fisher 1935, Pitman 1937): the part of random divisions of all values
 /// into two such samples whose means differ at least as much. 9999 divisions from a fixed seed. Requires values in both samples.
 [[nodiscard]] double permutation_p(std::span<const double> a, std::span<const double> b);

@@ -64,24 +64,29 @@ struct Counts {
 
 Causes::Causes(const std::filesystem::path& file) {
   CsvReader reader(file);
-  reader.require({"program", "cause"}, "a table of causes");
+  reader.require({"of", "program", "cause"}, "a table of causes");
   while (reader.next())
-    causes_.emplace_back(reader.text(reader.column("program")), reader.text(reader.column("cause")));
+    causes_.push_back({std::string(reader.text(reader.column("of"))),
+                       std::string(reader.text(reader.column("program"))),
+                       std::string(reader.text(reader.column("cause")))});
 }
 
-std::string Causes::of(const std::string& program) const {
-  const auto found =
-      std::find_if(causes_.begin(), causes_.end(), [&](const auto& one) { return one.first == program; });
-  return found == causes_.end() ? "" : found->second;
+std::string Causes::of(const std::string& what, const std::string& program) const {
+  const auto found = std::find_if(causes_.begin(), causes_.end(),
+                                  [&](const Cause& one) { return one.of == what && one.program == program; });
+  return found == causes_.end() ? "" : found->text;
 }
 
 std::string totals(const std::vector<Row>& rows) {
   const auto count = [&](bool Row::*what) {
     return std::count_if(rows.begin(), rows.end(), [what](const Row& row) { return row.*what; });
   };
-  const auto ran = count(&Row::ran);
-  return fmt::format("{} of {} programs that run both ways agree; {} do not run\n", count(&Row::agrees), ran,
-                     static_cast<std::ptrdiff_t>(rows.size()) - ran);
+  const auto open =
+      std::count_if(rows.begin(), rows.end(), [](const Row& row) { return row.verdict == "not distinguishable"; });
+  const auto ran = count(&Row::ran), agree = count(&Row::agrees) - open;
+  return fmt::format(
+      "Of {} programs that run both ways, {} agree, {} are not distinguishable, and {} differ; {} do not run\n",
+      ran, agree, open, ran - agree - open, static_cast<std::ptrdiff_t>(rows.size()) - ran);
 }
 
 std::string own_page(const std::vector<Row>& rows, const PairSettings& settings) {
@@ -112,14 +117,14 @@ std::string public_page(const std::vector<Row>& rows, const PairSettings& settin
   for (const auto& [name, counts] : repositories) page += counts.line(name);
   page += all.line("all");
   page +=
-      "\n## Programs that are not alike\n\n| program | verdict | largest difference: native, firmware | cause |\n"
+      "\n## Programs that are not alike\n\n| program | verdict | clearest difference: native, firmware | cause |\n"
       "|---|---|---|---|\n";
   for (const Row& row : rows) {
     if (row.ran && row.verdict != "alike" && row.verdict != "event for event")
       page += fmt::format("| `{}` | {} | {} | {} |\n", row.name, row.verdict, row.detail,
                           row.cause.empty() ? "not known" : row.cause);
   }
-  page += "\n## Programs that do not run\n\n| program | what is said | cause |\n|---|---|---|\n";
+  page += "\n## Programs that do not run\n\n| program | message | cause |\n|---|---|---|\n";
   for (const Row& row : rows) {
     if (!row.ran) page += fmt::format("| `{}` | {} | {} |\n", row.name, cell(row.note), row.cause);
   }

@@ -14,16 +14,19 @@ namespace kilotwin::validation {
 /// Seeds of a program with a measure that differs by more than 10 % with one seed; of one that the test then tells apart.
 inline constexpr int kMoreSeeds = static_cast<int>(kLeastRuns), kMostSeeds = 3 * kMoreSeeds;
 
-/// Causes for which programs differ or do not run: a table with the columns `program` and `cause`.
+/// Causes for which programs differ or do not run: a table with the columns `of` ("difference" or "refusal"), `program` and `cause`.
 class Causes {
  public:
   /// Throws UserError if the file is no such table.
   explicit Causes(const std::filesystem::path& file);
-  /// The cause for a program, or "". `program`: its path below the folder that is compared.
-  [[nodiscard]] std::string of(const std::string& program) const;
+  /// The cause of a program's difference or refusal, or "". `program`: its path below the folder that is compared.
+  [[nodiscard]] std::string of(const std::string& what, const std::string& program) const;
 
  private:
-  std::vector<std::pair<std::string, std::string>> causes_;
+  struct Cause {
+    std::string of, program, text;
+  };
+  std::vector<Cause> causes_;
 };
 
 /// One program.

@@ -4,7 +4,7 @@
 #include <chrono>
 #include <cstdint>
 
-namespace kilotwin::os {
+namespace kilotwin {
 
 namespace detail {
 template <typename Clock>
@@ -19,4 +19,4 @@ std::int64_t now_ns() {
 /// Time since an arbitrary moment. It never jumps.
 [[nodiscard]] inline std::int64_t steady_ns() { return detail::now_ns<std::chrono::steady_clock>(); }
 
-}  // namespace kilotwin::os
+}  // namespace kilotwin
