@@ -37,7 +37,7 @@ proto::Model read_model(const fs::path& file) {
   loaded.experiment.mutable_arena()->set_height_mm(1000);
   proto::RobotGroup& group = *loaded.experiment.add_robots();
   group.set_count(1);
-  group.add_behaviour("planned.c");
+  group.set_body(proto::RobotGroup::TRACKED);
   apply_model(loaded, file);
   validate(loaded);
   return model;
