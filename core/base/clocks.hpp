@@ -7,8 +7,7 @@
 namespace kilotwin {
 
 namespace detail {
-template <typename Clock>
-std::int64_t now_ns() {
+template <typename Clock> std::int64_t now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch()).count();
 }
 }  // namespace detail
