@@ -110,8 +110,9 @@ struct Estimates {
 };
 Estimates largest_estimates(const std::string& range) {
   constexpr std::uint32_t kListeners = 1000;
-  const RunPlan plan = make_plan("radio { model: PROPAGATION " + range + " propagation { sensitivity_sd_db: 0.5 } }",
-                                 testing::grid_crowd(kListeners, 300, testing::Facing::kRight));
+  const RunPlan plan =
+      make_plan("radio { model: PROPAGATION " + range + " propagation { sensitivity_sd_db: 0.5 } }",
+                testing::grid_crowd(kListeners, 300, testing::Facing::kRight));
   const LinkBudget links(plan);
   const RadioParameters parameters(plan);
   const int reading = links.gains(0).high;
