@@ -7,7 +7,7 @@ import fs from "node:fs";
 import path from "node:path";
 import { eventually } from "./browser.mjs";
 import {
-  clock, counter, kilotwin, newContext, onScreen, open, phase, picture, poseOfSelected, press, run, saved, scratch, select, serve, tell, text,
+  clock, counter, drawn, kilotwin, newContext, onScreen, open, phase, picture, poseOfSelected, press, run, saved, says, scratch, select, serve, tell, text,
 } from "./page_tools.mjs";
 
 const TICK_S = 0.032768;
@@ -75,7 +75,7 @@ async function movesAndHandOvers() {
   // Messages, counters and variables are recorded for the page. Messages come with the metrics of the radio. The federates say what they do.
   await eventually("messages", async () => (await counter(page, "flights")) > 0);
   await eventually("federates", async () => (await page.locator("#federates li").count()) >= 5);
-  assert.match(await text(page, "federates"), /physics 0,0computes \d+, exchanges \d+, waits \d+ %/);
+  await says(page, "federates", /physics 0,0computes \d+, exchanges \d+, waits \d+ %/);
   await eventually("nobody holds up a run at its pace", async () => (await text(page, "work-verdict")).startsWith("Nobody holds up"));
   await select(page, 7);
   await eventually("its messages", async () => /messages sent[1-9]\d*…?received[1-9]\d*…?heard most\d+ \(/.test(await text(page, "robot-facts")));
@@ -86,6 +86,7 @@ async function movesAndHandOvers() {
   // A viewer without the token moves nothing.
   const stranger = await open(served.address.replace(/#.*/, ""), await newContext());
   await phase(stranger, "live: running");
+  await eventually("a picture", async () => (await drawn(stranger)) > 1);
   assert.ok(await stranger.locator("#move").isDisabled());
   const before = await poseOfSelected(page);
   await drag(stranger, await onScreen(stranger, before[0], before[1]), await onScreen(stranger, 300, 300), true);
@@ -117,7 +118,7 @@ async function movesAndHandOvers() {
   await eventually("the robot is there", () => isAt(400, -300));
   const there = await poseOfSelected(page);
   // It went from the left partition to the right one.
-  assert.equal(await counter(page, "handOvers"), 1);
+  await eventually("the hand-over", async () => (await counter(page, "handOvers")) === 1);
   await eventually("its partition", async () => (await text(page, "robot-facts")).includes("partition1, 0"));
 
   // Its handle turns it; so do keys.
@@ -236,7 +237,7 @@ async function hybridRun() {
       near(Math.max(...xs) - Math.min(...xs), 2 * 2.4477 * 3 * pxPerMm, 0.5, "width of the ellipse");
     }
     await select(page, 1);
-    assert.match(await text(page, "robot-facts"), /kindtracked/);
+    await says(page, "robot-facts", /kindtracked/);
     // Real robots stay where they are.
     await eventually("the reason", async () => {
       await page.keyboard.press("0"); // a drag beside the robot, which drives on, moves the picture
@@ -261,11 +262,14 @@ async function hybridRun() {
   await page.keyboard.press("0");
   const view = await page.locator("#picture").boundingBox();
   const [lastX, lastY] = await onScreen(page, ...(await poseOfSelected(page)));
-  assert.ok((await lost()).some(([, x, y]) => Math.hypot(Number(x) + view.x - lastX, Number(y) - 4 + view.y - lastY) < 2), "robot 1 is marked where it was");
+  await eventually("robot 1 is marked where it was", async () =>
+    (await lost()).some(([, x, y]) => Math.hypot(Number(x) + view.x - lastX, Number(y) - 4 + view.y - lastY) < 2));
   // A click selects it.
   await page.keyboard.press("Escape");
-  await page.mouse.click(lastX, lastY);
-  await eventually("robot 1", async () => (await text(page, "robot-title")) === "Robot 1");
+  await eventually("robot 1", async () => {
+    await page.mouse.click(lastX, lastY);
+    return (await text(page, "robot-title")) === "Robot 1";
+  });
   await picture(page, "lost");
   assert.deepEqual(page.faults, []);
   page.once("dialog", (dialog) => dialog.accept());

@@ -68,6 +68,18 @@ export const press = (page, name) => page.getByRole("button", { name, exact: tru
 export const picture = async (page, name) => pictures && page.screenshot({ path: path.join(pictures, `${name}.png`) });
 export const phase = (page, wanted) => eventually(`phase ${wanted}`, async () => (await text(page, "phase")) === wanted);
 
+/** Waits until an element shows a text, or one that a regular expression matches. */
+export async function says(page, id, wanted) {
+  let last = "";
+  const look = async () => {
+    last = await text(page, id);
+    return wanted instanceof RegExp ? wanted.test(last) : last === wanted;
+  };
+  await eventually(`"${id}" shows ${wanted}`, look).catch((error) => {
+    throw new Error(`${error.message}; it shows ${JSON.stringify(last)}`);
+  });
+}
+
 /** Where a place of the arena is while the whole arena is shown. */
 export async function onScreen(page, x, y) {
   const box = await page.locator("#picture").boundingBox();
