@@ -21,7 +21,7 @@ const [kilotwin, view, samples] = ["kilotwin", "kilotwin-view", "tests/clients/v
 const npm = path.join(root, "build/npm");
 const WebSocket = createRequire(path.join(npm, "package.json"))("ws");
 const scratch = fs.mkdtempSync(path.join(os.tmpdir(), "kilotwin-bench-view-"));
-const header = execFileSync(path.join(root, "scripts/results-header"), ["The web page of a run", `bench/view.mjs ${words.join(" ")}`.trim()]).toString();
+const header = execFileSync(path.join(root, "bench/results.py"), ["head", "The web page of a run", `bench/view.mjs ${words.join(" ")}`.trim()]).toString();
 const load = () => os.loadavg()[0].toFixed(1);
 
 const median = (values) => [...values].sort((a, b) => a - b)[values.length >> 1];

@@ -319,7 +319,7 @@ identification::Walls walls_of(const Walls& walls) {
   return out;
 }
 
-/// What a reader must know about the errors and the search; empty: nothing.
+/// Caveats of the errors and the search, for readers; empty: none.
 std::string caveats_of(const Findings& f) {
   std::vector<std::string> sentences;
   const double before_mm = f.before.errors.rmse_mm(), after_mm = f.after.errors.rmse_mm();

@@ -1,4 +1,4 @@
-/// What an identification from trajectories found, before it is written.
+/// The result of an identification from trajectories, before it is written.
 #pragma once
 
 #include <map>

@@ -141,7 +141,7 @@ Search found_by_search(const Fitter& fitter, const FitState& base, const Measure
   if (!options.find_effects) return found;
   const auto leaves_much = [&](const FitState& fit) {
     const std::vector<Forecast> all = forecast(fit.model, fit.tracks, times, Tracks::kFit, options.threads);
-    // What robots do in contact is uncertain, and no effect.
+    // Motion in contact is uncertain, and no effect.
     const std::vector<Forecast> free = free_ones(fit.model, fit.tracks, all, options.horizon_s);
     PredictionErrors errors = errors_of(train, free);
     const FitState white = with_white_noise(fitter, fit);

@@ -198,7 +198,7 @@ Point ArkMosaic::in_camera(std::size_t camera, const FloorPoint& point) const {
   return {pixels[0].x, pixels[0].y};
 }
 
-/// Which camera serves which part of the joined picture.
+/// Decides which camera serves which part of the joined picture.
 void ArkMosaic::map_parts() {
   cv::Mat best(size_, CV_32F, cv::Scalar(0)), whose(size_, CV_8U, cv::Scalar(kArkCameras));
   std::array<cv::Mat, kArkCameras> maps;

@@ -1,4 +1,4 @@
-/// Which measurement belongs to which track: the assignment of least total cost, within gates.
+/// Data association: assigns measurements to tracks at the least total cost, within gates.
 #pragma once
 
 #include <cstddef>

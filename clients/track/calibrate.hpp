@@ -31,7 +31,7 @@ struct Calibration {
 
 /// OpenCV's FileStorage, YAML or XML. Throws RunError.
 void write_calibration(const Calibration& calibration, const std::filesystem::path& file);
-/// What write_calibration wrote, camera.xml of `kilotwin cameras`, or a file with corner1..corner4 as ARK writes them: pixels of the arena's corners (top left, top
+/// Reads a file of write_calibration, camera.xml of `kilotwin cameras`, or a file with corner1..corner4 as ARK writes them: pixels of the arena's corners (top left, top
 /// right, bottom left, bottom right), where `arena_mm` states the arena's size. Throws UserError.
 [[nodiscard]] FloorMap read_calibration(const std::filesystem::path& file, const cv::Size2d& arena_mm);
 

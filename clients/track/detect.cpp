@@ -213,7 +213,7 @@ std::vector<Detection> Detector::find(const cv::Mat& grey) {
   circles = apart(only_covered(with_neighbours(grey, circles, *radius)));
   if (circles.empty()) return {};
 
-  // What most circles have in common tells the robots from the rest.
+  // The median contrast and radius tell the robots from other circles.
   std::vector<double> contrasts, radii;
   for (const FittedCircle& circle : circles) {
     if (circle.coverage < 0.7) continue;

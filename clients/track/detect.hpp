@@ -19,8 +19,8 @@ inline constexpr double kLeastRadius_px = 5, kMostRadius_px = 90;
 /// Below, robots that touch or lie in clutter are missed: docs/results/camera-tracker.md, "Drawn discs".
 inline constexpr double kWellSeenRadius_px = 8;
 
-/// What is wrong with the size of the robots in the picture, and what would do; empty where all is well. `radius_px`: of their
-/// discs, as found or as the calibration states it; nothing where neither is known.
+/// Says what is wrong with the size of the robots in the picture, and which size would do; empty where all is well. `radius_px`:
+/// of their discs, as found or as the calibration states it; nothing where neither is known.
 [[nodiscard]] std::string scale_advice(std::optional<double> radius_px);
 
 /// A robot in one picture.
@@ -32,7 +32,7 @@ struct Detection {
   Covariance error_px2;
 };
 
-/// What the discs of one camera have in common.
+/// The common appearance of the discs of one camera.
 struct Look {
   double radius_px = 0;
   double contrast = 0;  ///< median of the robots'

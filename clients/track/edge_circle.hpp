@@ -39,7 +39,7 @@ struct FittedCircle {
   cv::Matx22d spread = cv::Matx22d::eye();
 };
 
-/// What the fit may assume.
+/// Assumptions of the fit.
 struct FitLimits {
   double radius_tolerance = 0.25;  ///< the radius may differ by this share from the guess's
   double least_rise = 0.06;        ///< smallest rise of log brightness across an edge that counts

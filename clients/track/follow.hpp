@@ -40,7 +40,7 @@ struct Track {
   bool doubt = false;                   ///< it may have exchanged its identity with another track
   bool confirmed = false;
 
-  // What only the follower uses.
+  // Only the follower uses these.
   StraightPath path;
   std::optional<Led> led_read{};  ///< of the last picture
   int frames = 0, hits = 0;       ///< while it is not confirmed

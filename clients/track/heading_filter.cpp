@@ -12,7 +12,7 @@ namespace {
 /// The disc's centre ahead of the middle of the rear legs: docs/explanation/motion.md, axle_offset_mm.
 constexpr double kAhead_mm = 9.2;
 
-/// What a mode begins with. Speeds: docs/explanation/motion.md; the spread is that of uncalibrated robots.
+/// The state with which a mode begins. Speeds: docs/explanation/motion.md; the spread is that of uncalibrated robots.
 struct Mode {
   double speed_mm_s, turn_rad_s, speed_sd, turn_sd;  ///< of held: velocity, and its standard deviations in mm/s
 };

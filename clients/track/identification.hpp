@@ -1,4 +1,4 @@
-/// Which robot is which track: ARK's identification. The station broadcasts a number; the robot of that number turns its LED
+/// Finds the robot of each track: ARK's identification. The station broadcasts a number; the robot of that number turns its LED
 /// blue, all others another colour. docs/explanation/camera-tracker.md has the rule. Pure: questions and frames in, numbers out.
 #pragma once
 

@@ -45,7 +45,7 @@ class PictureFiles : public Source {
   std::size_t at_ = 0;
 };
 
-/// A directory that grows. Who writes there renames whole files into it.
+/// A directory that grows. Its writer renames whole files into it.
 class GrowingDirectory : public Source {
  public:
   GrowingDirectory(fs::path directory, std::string suffix)
@@ -237,7 +237,7 @@ void FrameQueue::read() {
 
 std::optional<CapturedFrame> FrameQueue::next(const std::function<bool()>& stopped) {
   std::unique_lock lock(mutex_);
-  // What `stopped` looks at changes without a wake-up.
+  // The state that `stopped` reads changes without a wake-up.
   constexpr std::chrono::milliseconds kLook{50};
   while (!stop_ && !stopped() && frames_.empty() && !ended_) changed_.wait_for(lock, kLook);
   if (stop_ || stopped()) return std::nullopt;

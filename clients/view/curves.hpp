@@ -26,7 +26,7 @@ struct Curves {
   bool whole = true;                        ///< false: the next answer has more
 };
 
-/// What can be plotted.
+/// A quantity that can be plotted.
 struct PlotEntry {
   std::string name, title, unit;
   bool of_swarm = true, of_robot = false;

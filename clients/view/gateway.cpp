@@ -88,7 +88,7 @@ struct Viewer {
   }
 };
 
-/// What libwebsockets keeps per connection, as zeroed memory.
+/// State per connection. libwebsockets keeps it, as zeroed memory.
 struct Download {
   const PageFile* file;
   std::size_t sent;

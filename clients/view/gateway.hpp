@@ -33,7 +33,7 @@ class Answers {
   virtual ~Answers() = default;
   /// The state at or before a tick, as a frame; empty: there is none.
   [[nodiscard]] virtual std::string frame_at(std::int64_t tick, std::uint32_t request) = 0;
-  /// What lies on the floor at that tick: a number that changes with it, and a message of type "floors".
+  /// The pictures on the floor at that tick: a number that changes with them, and a message of type "floors".
   [[nodiscard]] virtual std::uint64_t floors_version(std::int64_t tick) = 0;
   [[nodiscard]] virtual std::string floors_at(std::int64_t tick) = 0;
   /// The light at that tick, a message of type "light". Empty: the run has none.

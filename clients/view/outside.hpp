@@ -1,4 +1,4 @@
-/// What enters a run from outside, for viewers: where trackers saw robots and how sure they are, and packets for the overhead
+/// External input of a run, for viewers: where trackers saw robots and how sure they are, and packets for the overhead
 /// controller.
 #pragma once
 

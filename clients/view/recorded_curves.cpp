@@ -16,7 +16,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// What one curve may read of the file, and the octets per robot of a state and of the value of a variable.
+/// Octets of the file that one curve may read, and the octets per robot of a state and of the value of a variable.
 constexpr std::size_t kCurveBytes = 48'000'000, kStateBytesPerRobot = 26, kValueBytesPerRobot = 6;
 /// Of a recording that grows, an answer is given again for so long.
 constexpr auto kAnswerHolds = 1s;
@@ -218,7 +218,7 @@ Curves RecordedCurves::of_states(const Plot& plot) {
 }
 
 bool RecordedCurves::take_own() {
-  // What variables say of the last ticks may still come.
+  // Values of variables at the last ticks may still come.
   std::int64_t settled = index_.states().back().tick;
   for (std::size_t v = 0; v < static_cast<std::size_t>(reader_.header().variable_size()) && !index_.ended(); ++v) {
     const std::vector<recorder::StateIndex::Entry>& all = index_.variable(v);

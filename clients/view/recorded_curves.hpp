@@ -68,7 +68,7 @@ class RecordedCurves {
     std::vector<std::uint64_t> up_to;
   };
 
-  /// What was read for one curve: up to three numbers, by number of the state or of the variable's tick.
+  /// Values that were read for one curve: up to three numbers, by number of the state or of the variable's tick.
   using Points = std::map<std::size_t, std::array<double, 3>>;
   enum class Curve : std::uint8_t { kPath, kTrail, kVariable };
   struct KnownPoints {

@@ -37,7 +37,7 @@ fs::path recording_of(const fs::path& run) {
   return recorder::RunDirectory::open(run, recorder::RunDirectory::Needs::kRecording).recording();
 }
 
-/// What the header says of an experiment, for recordings without their run directory.
+/// The experiment as far as the header describes it, for recordings without their run directory.
 proto::Experiment experiment_of(const proto::RecordingHeader& header) {
   proto::Experiment experiment;
   if (header.has_arena()) {

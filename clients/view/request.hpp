@@ -1,4 +1,4 @@
-/// What a viewer asks for: one JSON object per message, at most kLongestRequest_bytes.
+/// A viewer's request: one JSON object per message, at most kLongestRequest_bytes.
 ///
 ///   {"do": "hello", "token": "..."}      shows that it may steer the run
 ///   {"do": "next"}                       the next state of a live run, once

@@ -1,4 +1,4 @@
-/// What a robot has printed, for viewers: the last lines up to a time.
+/// The printed lines of a robot, for viewers: the last lines up to a time.
 #pragma once
 
 #include <cstddef>

@@ -31,7 +31,7 @@ class RobotMessages {
   [[nodiscard]] MessageCounts until(std::uint32_t robot, std::int64_t tick);
 
  private:
-  /// What is known of a robot, from the first records of each kind.
+  /// Messages of a robot, from the first records of each kind.
   struct Known {
     std::uint32_t robot = 0;
     std::size_t sent_read = 0, received_read = 0;                  ///< records

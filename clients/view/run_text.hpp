@@ -1,4 +1,4 @@
-/// What viewers are told of a run, as JSON: its arena and bodies, its groups, and how frames are coded. Text in it may come
+/// The description of a run for viewers, as JSON: its arena and bodies, its groups, and how frames are coded. Text in it may come
 /// from anywhere: it is valid UTF-8 and escaped, and the page shows it as text only.
 #pragma once
 
@@ -40,7 +40,7 @@ struct RunOutline {
 /// A message of type "trail": where a robot was, oldest first, x and y in turn; not finite: it was placed elsewhere in between. `whole`: false:
 /// there is more, if it is asked for again.
 [[nodiscard]] std::string trail_text(std::uint32_t robot, const std::vector<double>& xy_mm, bool whole);
-/// What a robot's program knows and has printed up to a tick.
+/// Variables of a robot's program, and its printed lines up to a tick.
 struct ProgramText {
   std::uint32_t robot = 0;
   std::int64_t tick = 0;

@@ -1,4 +1,4 @@
-/// Who computes and who waits, for viewers: where the wall time of a run's federates goes.
+/// The wall time of a run's federates, for viewers: how long each computes, and for whom it waits.
 #pragma once
 
 #include <chrono>

@@ -1,4 +1,4 @@
-/// What ARK's cameras and tracker make of the robots. Pure: frames are a function of the swarm at their exposure and of the
+/// The picture that ARK's cameras and tracker give of the robots. Pure: frames are a function of the swarm at their exposure and of the
 /// model's state. docs/explanation/station-camera.md has the equations.
 ///
 /// A frame is exposed every 1/rate and shown a latency later; the first one is shown at once. Per frame:
@@ -36,9 +36,9 @@ class CameraModel {
   /// Exposes and shows the frames that are due at the swarm's tick. `measured`: poses with the effects on what is measured, or
   /// nullptr where there are none. Ticks ascend from 0, or from that of load().
   void step(const SwarmView& swarm, const MeasuredPoses* measured);
-  /// What the station sees at present.
+  /// The robots as the station sees them at present.
   [[nodiscard]] const SeenRobots& shown() const { return shown_; }
-  /// Which robot the tracker follows under number `track`.
+  /// The robot that the tracker follows under number `track`.
   [[nodiscard]] std::uint32_t follows(std::uint32_t track) const { return tracks_[track].follows; }
 
   [[nodiscard]] std::uint64_t word() const;

@@ -12,7 +12,7 @@
 namespace kilotwin::ark {
 namespace {
 
-/// Far more than people and programs send between two ticks. What floods beyond it is ignored.
+/// Far more than people and programs send between two ticks. Requests beyond it are ignored.
 constexpr std::size_t kMostRequests = 1000;
 /// Of all topics. The requests of each are remembered for the whole run.
 constexpr std::size_t kMostClients = 1000;

@@ -1,5 +1,5 @@
-/// External input, from the public topics: collected on receive threads, handed over on the station's own. What clients can
-/// make it keep or write is bounded.
+/// External input, from the public topics: collected on receive threads, handed over on the station's own. Clients can
+/// make it keep and write a bounded amount only.
 #pragma once
 
 #include <chrono>
@@ -20,7 +20,7 @@ class ExternalInput {
  public:
   ExternalInput(const RunPlan& plan, const dds::Participant& participant);
 
-  /// What has come since the last call, in the order of arrival; sequence numbers and ticks are still to be given.
+  /// Directives that have come since the last call, in the order of arrival; sequence numbers and ticks are still to be given.
   std::vector<Directive> take();
 
  private:

@@ -1,5 +1,5 @@
-/// What listeners heard of real robots, from the public topic: checked on receive threads, taken on the station's own thread.
-/// What waits is bounded: the oldest messages are dropped.
+/// Messages that listeners heard of real robots, from the public topic: checked on receive threads, taken on the station's own thread.
+/// The queue is bounded: the oldest messages are dropped.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ namespace kilotwin::ark {
 class HeardInput {
  public:
   HeardInput(const RunPlan& plan, const dds::Participant& participant);
-  /// What has come since the last call, in the order of arrival.
+  /// Messages that have come since the last call, in the order of arrival.
   [[nodiscard]] std::vector<HeardMessage> take();
 
  private:

@@ -1,4 +1,4 @@
-/// What waits for the overhead controller: messages to single robots, three to a packet, and broadcasts, which go first.
+/// The queue of the overhead controller: messages to single robots, three to a packet, and broadcasts, which go first.
 ///
 /// Of one environment a robot has at most one message that waits: a newer one replaces it and keeps its place. A robot can be
 /// served once its least interval has passed. Those that can be served go in the order in which they could be first; of

@@ -15,7 +15,7 @@ namespace kilotwin::ark {
 class PluginHost {
  public:
   virtual ~PluginHost() = default;
-  /// What the plugin answers. After a reply with a `failure` that says `crashed` every further one fails, too.
+  /// The plugin's reply. After a reply with a `failure` that says `crashed` every further one fails, too.
   [[nodiscard]] virtual station::Reply ask(const station::Request& request) = 0;
 };
 

@@ -28,7 +28,7 @@ class RunMetrics {
   [[nodiscard]] bool heard_all();
   /// Every federate has sent its last metrics.
   [[nodiscard]] bool complete();
-  /// What the metrics say so far; the fields that they do not know are left alone.
+  /// Fills in the totals so far; fields that the metrics do not know are left alone.
   void fill(RunTotals& totals);
 
  private:

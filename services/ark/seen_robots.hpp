@@ -1,4 +1,4 @@
-/// What the station sees of the robots: true, or as its cameras and tracker show it. Nothing else of the swarm reaches plugins.
+/// The robots as the station sees them: true, or as its cameras and tracker show it. Nothing else of the swarm reaches plugins.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-/// What real robots would hear of simulated ones, as messages of the station: `hears_simulated` in idl/experiment.proto.
+/// Messages that real robots would hear of simulated ones, as messages of the station: `hears_simulated` in idl/experiment.proto.
 ///
 /// Whenever simulated robots send, each real robot of such a group hears the nearest of them within range. It needs no
 /// memory: the queue of the station keeps what waits. Pure.

@@ -33,7 +33,7 @@ double robot_interval_s(const StationSettings& setting, std::uint32_t robots) {
   return setting.robot_interval_s.value_or(rule_s);
 }
 
-/// Who puts messages into the queue.
+/// The senders that put messages into the queue.
 std::vector<EnvironmentSettings> places_of(const StationSettings& setting, const SimulatedHearing& hearing) {
   std::vector<EnvironmentSettings> places = setting.environments;
   if (hearing.any()) places.emplace_back();
@@ -272,7 +272,7 @@ void StationEngine::step(Tick from, const Inputs& inputs) {
   std::stable_sort(packets_.begin(), packets_.end(), [](const OverheadPacket& a, const OverheadPacket& b) {
     return a.offset_cycles() < b.offset_cycles();
   });
-  // What the controller does now is not the station's to stop; the next own packet overrides it, an interval later.
+  // The station must not stop an external packet; the next own packet overrides it, an interval later.
   repeating_ = false;
   next_packet_ = std::max(next_packet_, begin_of(now_) + packets_.back().offset_cycles() + packet_interval_);
 }

@@ -34,14 +34,14 @@ class StationState;
 
 namespace kilotwin::ark {
 
-/// What a step from tick k reads; all of it is of tick k.
+/// Inputs of a step from tick k; all of them are of tick k.
 struct Inputs {
   const SwarmView& swarm;
   std::span<const OverheadPacket> external;         ///< stamped by the ingress for this tick, in order
   std::span<const MembershipChange> memberships{};  ///< that take effect in this step, in order
 };
 
-/// What plugins gave in the last step beside messages; for people and files, no part of the state.
+/// Output of plugins in the last step, beside messages; for people and files, no part of the state.
 struct PluginOutput {
   std::uint32_t environment = 0;
   std::string failure{};  ///< one line; from now on the plugin is called no more

@@ -18,7 +18,7 @@ class StationOutputs {
   /// An empty `run_directory`: no files, and failures are not said. Logs of an earlier attempt keep the rows before `first`.
   StationOutputs(const RunPlan& plan, std::filesystem::path run_directory, Tick first);
 
-  /// What the engine's last step, from tick `from`, has put out. Throws RunError where a plugin's failure ends the run, or a
+  /// Writes the output of the engine's last step, from tick `from`. Throws RunError where a plugin's failure ends the run, or a
   /// file cannot be written.
   void take(Tick from, const StationEngine& engine, RunObserver& observer);
 
@@ -30,7 +30,7 @@ class StationOutputs {
   std::map<std::uint32_t, FloorPicture> floors_;  ///< the last one of each environment
 };
 
-/// What the station did until tick `last`.
+/// The station's counters until tick `last`.
 [[nodiscard]] StationTotals station_totals(const RunPlan& plan, const StationEngine& engine, Tick last);
 
 }  // namespace kilotwin::ark

@@ -222,7 +222,7 @@ class StationFederate : public Federate {
       saved_ = written_;
   }
 
-  /// What comes before the first tick waits for it.
+  /// Input that comes before the first tick waits for it.
   void announce(Tick now) {
     if (!session_.started()) return;
     for (const Directive& directive : external_input_.take()) announce(now, directive);

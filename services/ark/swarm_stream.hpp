@@ -1,4 +1,4 @@
-/// What observers get of a run: its description, and the state of the whole swarm as fast as wall time asks for. Nothing of the
+/// The samples of a run for observers: its description, and the state of the whole swarm as fast as wall time asks for. Nothing of the
 /// run waits for an observer: the states are best effort, and the description is one sample that the writer keeps.
 #pragma once
 

@@ -27,7 +27,7 @@ std::span<const TrackerSample> TrackedRobots::samples_of(Tick now, std::int64_t 
       samples_.push_back(std::move(stamped_.front().second));
   } else {
     for (TrackerInput::Stamped& stamped : arrived) {
-      // What came before the run began to count waited for the run, not for its tick.
+      // A sample that came before the run began to count waited for the run, not for its tick.
       if (counts_) underway_.push_back({now + 1, stamped.exposed, stamped.arrival, taken});
       samples_.push_back(std::move(stamped.sample));
     }

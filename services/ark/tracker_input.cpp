@@ -144,7 +144,7 @@ void TrackerInput::on_sample(const PublicTrackerFrame& sample) {
   ++flooded_;
 }
 
-/// What people should know of a source's clock.
+/// Counts lost frames, and says when a source's clock restarted or is wrong.
 void TrackerInput::watch(Source& source, const Waiting& waiting) {
   if (source.frames > 1 && waiting.time.frame > source.last_frame + 1)
     source.dropped += waiting.time.frame - source.last_frame - 1;

@@ -1,5 +1,5 @@
 /// Samples of camera trackers, from the public topic: checked on receive threads, stamped with simulated time on the station's
-/// own thread. What waits is bounded: of a source that floods, the oldest samples are dropped and counted.
+/// own thread. The queue is bounded: of a source that floods, the oldest samples are dropped and counted.
 #pragma once
 
 #include <chrono>
@@ -29,7 +29,7 @@ class TrackerInput {
     TrackerSample sample;
     Clock::time_point exposed, arrival;  ///< exposed: by the model of the source's clock
   };
-  /// What has come since the last call, in the order of arrival. `now_cycle`: the simulated time at `now`; `pace`: simulated
+  /// Samples that have come since the last call, in the order of arrival. `now_cycle`: the simulated time at `now`; `pace`: simulated
   /// over wall time.
   std::vector<Stamped> take(Clock::time_point now, std::int64_t now_cycle, double pace);
 

@@ -1,7 +1,8 @@
 // Evaluates `kilotwin identify` on the scenes of tests/identify/truth. Prints prediction errors before and after
 // beside those of an oracle, correctly named effects, and false findings. Exit status 1 if a criterion fails.
 // Usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--robots N] [--runs N] [--seconds S]
-//              [--nothing N] [--coverage N] [--rivals] [--jobs N] [SCENE|nothing:SEED]...
+//              [--nothing N] [--coverage N] [--rivals] [--jobs N] [--all | SCENE|nothing:SEED...]
+// --all: all scenes, without sets that have no effect.
 // --coverage N: how often the 95 % intervals of N sets hold the true values.
 // --rivals: other methods on the same scenes, beside it.
 // --robots, --runs and --seconds override a scene's number of robots, number of training runs and their duration.
@@ -56,7 +57,7 @@ int usage() {
   fmt::print(
       stderr,
       "usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--robots N] [--runs N] [--seconds S] "
-      "[--nothing N] [--coverage N] [--rivals] [--jobs N] [SCENE|nothing:SEED]...\n"
+      "[--nothing N] [--coverage N] [--rivals] [--jobs N] [--all | SCENE|nothing:SEED...]\n"
       "Without scenes and --nothing: all scenes, and 300 small sets without an effect. Scenes: {}\n",
       fmt::join(scenario_names(), " "));
   return 2;
@@ -340,6 +341,8 @@ int main(int argc, char** argv) {
         arguments.small = true;
       } else if (word == "--rivals") {
         arguments.rivals = true;
+      } else if (word == "--all") {
+        arguments.scenes = scenario_names();
       } else if (word.rfind("--", 0) != 0) {
         scene_of(word);
         arguments.scenes.push_back(word);

@@ -64,7 +64,7 @@ TEST_F(LastCheck, TakesOutUselessTermsOnly) {
   EXPECT_EQ(f.check.gains.size(), 1U);
   EXPECT_GT(f.check.gains.front().nat, 0);
   EXPECT_EQ(f.check.dropped, (std::vector<std::string>{"turning-by-heading", "speed-by-neighbours"}));
-  // What was dropped is among the rejected ones, with the reason.
+  // A dropped effect is among the rejected ones, with the reason.
   ASSERT_EQ(f.found.rejected.size(), 2U);
   for (const Rejected& r : f.found.rejected) EXPECT_FALSE(r.why.empty()) << r.name;
 }

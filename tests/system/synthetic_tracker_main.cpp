@@ -1,4 +1,4 @@
-// The tracker of bench/hybrid and bench/endurance: robots that circle at 10 mm/s, on a square grid around the origin.
+// The tracker of bench/tracking and bench/endurance: robots that circle at 10 mm/s, on a square grid around the origin.
 // Usage: synthetic_tracker DOMAIN FIRST COUNT PITCH_MM [PACE]. PACE: that of the run, default 1. It ends upon SIGINT or SIGTERM.
 #include "tests/system/synthetic_tracker.hpp"
 

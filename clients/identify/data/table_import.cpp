@@ -64,7 +64,7 @@ std::string rows_of_table(const fs::path& file, const TableFormat& format) {
   return rows;
 }
 
-/// What a table of `kilotwin track` says about one robot in one frame.
+/// A row of a table of `kilotwin track`: one robot in one frame.
 struct TrackedRow {
   std::uint32_t robot;
   double time_s, x, y, radius_px, heading_rad;

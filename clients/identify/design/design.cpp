@@ -161,7 +161,7 @@ class Laboratory {
 
   [[nodiscard]] const DesignQuestion& question() const { return question_; }
   [[nodiscard]] bool coupled() const { return coupled_; }
-  /// What the search maximises. `products`: up to each checkpoint.
+  /// The objective that the search maximises, in nat. `products`: up to each checkpoint.
   [[nodiscard]] double merit(const std::vector<Eigen::MatrixXd>& products) const {
     if (question_.of_parameters()) return information_nat(question_, products.back());
     double sum = 0;

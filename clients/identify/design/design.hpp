@@ -35,10 +35,10 @@ struct Design {
   RecordingPlan plan;
   InformationCurve planned;
   std::vector<InformationCurve> random;  ///< of random commands from random places
-  /// What random commands give by the end, mean of the plans.
+  /// Information of random commands by the end, mean of the plans.
   double random_nat = 0;
-  /// What is compared: the information of random commands by the end, at most a decision; and when the plan and random commands reach it,
-  /// the latter in the mean, with the end where they do not.
+  /// Compared quantities. needed_nat: the information of random commands by the end, at most a decision. planned_s and random_s: when the plan
+  /// and random commands reach it; the latter is a mean, in which a plan that does not reach it counts with the end.
   double needed_nat = 0, planned_s = 0, random_s = 0;
   /// Expected standard deviations of the columns after the recording; only of a question of parameters.
   std::vector<double> sd_after;

@@ -14,7 +14,7 @@
 
 namespace kilotwin::identify {
 
-/// What a future recording is like, apart from the commands.
+/// Conditions of a future recording, apart from the commands.
 struct RecordingConditions {
   double every_s = 0.5;  ///< between two samples of a robot
   bool headings = true;  ///< whether the tracker measures them

@@ -1,4 +1,4 @@
-/// What a planned recording is to find out: parameters of the present model, or which of several models is true.
+/// The question that a planned recording is to answer: parameters of the present model, or which of several models is true.
 ///
 /// Everything is linear about the present model. A column is the derivative of the predicted tracks by one number: a parameter of the
 /// base model, the amplitude of an effect, its trend over a covariate. Models differ by the effects that one has and another has not.
@@ -42,7 +42,7 @@ struct DesignQuestion {
 /// The parameters of the base model, and the amplitude of each effect that `result` names.
 [[nodiscard]] DesignQuestion question_of_parameters(const proto::Model&, const identification::Result&);
 
-/// Which model is true, the present one first. Parameters of each: those of the base model; an amplitude and a trend over each covariate of the
+/// The question which model is true, the present one first. Parameters of each: those of the base model; an amplitude and a trend over each covariate of the
 /// effects that not all models have. Throws UserError if a model has the effects of an earlier one.
 [[nodiscard]] DesignQuestion question_of_models(const std::vector<std::pair<std::string, proto::Model>>& models,
                                                 const identification::Result&, double duration_s, double reach_mm);

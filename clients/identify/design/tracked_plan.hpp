@@ -11,7 +11,7 @@ namespace kilotwin::identify {
 /// Samples by robot and instant. All robots are sampled at the same times: 0, every_s, 2 every_s...
 using PlanTracks = std::vector<std::vector<Sample>>;
 
-/// The model without the noise of the tracker. What is left is what happens to robots: two models with the same seed meet the same
+/// The model without the noise of the tracker. The noise of the motion stays: two models with the same seed meet the same
 /// disturbances.
 [[nodiscard]] proto::Model without_tracker_noise(const proto::Model&);
 

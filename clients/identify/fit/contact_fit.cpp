@@ -88,7 +88,7 @@ void Fitter::fit_walls(FitState& state) const {
       for (const Sample& s : view.track->samples) places.push_back(side.sign * place_of(view, s).*side.along);
     if (places.size() < 100) return;
     const double edge = stats::upper_end(places, std::max<std::size_t>(3, places.size() / 2000));
-    // Whichever way a robot points, its disc centre was at least here.
+    // Its disc centre reached at least this place, whatever its heading.
     reached.*side.wall = side.sign * (edge - reach);
     // Tracks that came near the side, at most kMost.
     constexpr std::size_t kMost = 16;

@@ -34,7 +34,7 @@ template <class Each> void sub_steps(const CommandClock& clock, double from_s, d
   }
 }
 
-/// A track with what the filter needs. What it points to belongs to the PreparedSet, and is constant.
+/// A track with what the filter needs. It points to constant objects of the PreparedSet.
 struct TrackView {
   const Track* track = nullptr;
   std::uint32_t run = 0;     ///< index in the set

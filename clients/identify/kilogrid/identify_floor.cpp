@@ -399,7 +399,7 @@ void FloorIdentification::add_ambiguities() {
         "let robots drive along the wall with the boundary messages switched off");
 }
 
-/// What a reader must know about the errors.
+/// Adds the caveats of the errors, for readers.
 void FloorIdentification::add_caveats(const OpenedDays::Opened& opened) {
   std::vector<std::string> sentences;
   if (days_.chose_on_reported)

@@ -227,7 +227,7 @@ Amplitudes without_amplitudes(const std::vector<Effect>& effects) {
   return out;
 }
 
-/// What distinguishes a record from others of its term: "along y, going straight: ".
+/// The words that distinguish a record from others of its term: "along y, going straight: ".
 std::string which_of(const Effect& effect) {
   std::vector<std::string> parts;
   if (effect.wheel() == Effect::LEFT_WHEEL) parts.emplace_back("left wheel");

@@ -33,7 +33,7 @@ class TrafficGrid {
     else
       *c = {kept(*c, now_s) + static_cast<float>(seconds), passage.at_s};
   }
-  /// What a robot reads there: seconds, or the freshness of a trail.
+  /// The covariate of a robot there: seconds, or the freshness of a trail.
   [[nodiscard]] float value(std::size_t robot, double x_mm, double y_mm, double now_s = 0) const {
     const Content* const c = &contents_[cell(x_mm, y_mm)];
     if (!cells_.trail) return kept(*c, now_s);

@@ -147,7 +147,7 @@ std::string words_of(const identification::Simulated& simulated, bool decidable)
   return out;
 }
 
-/// What is compared: runs with their scenes, and all compared tracks.
+/// The compared data: runs with their scenes, and all compared tracks.
 struct Comparable {
   std::vector<Played> played;
   std::vector<const Track*> tracks;

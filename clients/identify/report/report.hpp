@@ -8,7 +8,7 @@
 
 namespace kilotwin::identify {
 
-/// Renders a result of any kind of data. What it lacks is left out. gnuplot draws the plots.
+/// Renders a result of any kind of data. Sections without content are left out. gnuplot draws the plots.
 /// Throws RunError if it is missing.
 [[nodiscard]] std::string report_html(const identification::Identification&);
 

@@ -21,7 +21,7 @@ std::optional<double> share_explained(const Errors& e) {
   return std::clamp((*e.before * *e.before - *e.after * *e.after) / could, 0.0, 1.0);
 }
 
-/// What the motion depends on, in the words of the headline.
+/// The headline: the variables on which the motion depends.
 void add_headline(Data& page, const Result& result) {
   std::vector<std::string> phrases;
   bool tracker = false;

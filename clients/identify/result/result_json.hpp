@@ -12,7 +12,7 @@ namespace kilotwin::identify {
 /// By protobuf's JSON printer, with the field names of the schema. Lists are there even if empty.
 [[nodiscard]] nlohmann::json json_of(const google::protobuf::Message&);
 
-/// result.json. What belongs to other kinds of data is left out.
+/// result.json. Fields of other kinds of data are left out.
 [[nodiscard]] nlohmann::json json_of(const identification::Result&);
 
 }  // namespace kilotwin::identify

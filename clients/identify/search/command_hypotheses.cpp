@@ -129,7 +129,7 @@ void add_inertia_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   if (extent.has_straight) moving.push_back(1);
   if (extent.has_turns) moving.insert(moving.end(), {2, 3});
   if (moving.size() + (extent.has_stop ? 1 : 0) < 2) return;
-  // What is left of the motion under the previous command, and what lacks of that under the present one.
+  // The rest of the motion under the previous command, and the part that the motion under the present one still lacks.
   const Factor since = keyed(Shape::kExponential, Covariate::kSinceCommand, {0.4, 1.2, 3.6});
   std::vector<Eigen::Index> columns;
   for (const Target target : {Target::kAhead, Target::kTurn}) {

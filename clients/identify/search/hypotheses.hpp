@@ -35,7 +35,7 @@ struct Dictionary {
   [[nodiscard]] Eigen::Index columns() const { return scale.size(); }
 };
 
-/// What the data cover: ranges of covariates, robots, commands.
+/// The extent of the data: ranges of covariates, robots, commands.
 struct Extent {
   double x_low_mm = 0, x_high_mm = 1, y_low_mm = 0, y_high_mm = 1;
   double duration_s = 1, motor_s = 1, driven_s = 1, since_s = 1;

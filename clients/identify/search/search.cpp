@@ -409,7 +409,7 @@ class Loop {
     }
     if (!refine_neighbour_shape(fitter_, out_.fit, place) && !refine_traffic_shape(fitter_, out_.fit, place))
       refine_curves(fitter_, out_.fit, place);
-    // What smooth curves leave of a switch would pass the tests as one further term after another.
+    // Smooth curves leave residuals of a switch, which would pass the tests as one further term after another.
     if (simplify_to_switch(fitter_, out_.fit, place)) return;
     const std::string before = out_.fit.model.terms[place].name;
     if (refine_wave_numbers(fitter_, out_.fit, place)) refit(fitter_, out_.fit, place);

@@ -1,4 +1,4 @@
-/// What prediction errors look like: their means over bins of one covariate, or of two together.
+/// Patterns of prediction errors: their means over bins of one covariate, or of two together.
 #pragma once
 
 #include <Eigen/Core>

@@ -102,7 +102,7 @@ std::optional<LearnerCheck> check_of(const MeasuredSet& set, const std::vector<W
   return LearnerCheck{without.rmse_mm(), with.rmse_mm(), bounds->less_by, cross_validated};
 }
 
-/// What one comparison leaves to explain.
+/// The error that one comparison leaves to explain.
 struct Gap {
   double systematic_mm = 0;
   std::string evidence;

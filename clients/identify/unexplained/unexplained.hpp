@@ -1,4 +1,4 @@
-/// What a model leaves unexplained: its error on held-out data, compared with
+/// The unexplained part of a model's error: its error on held-out data, compared with
 ///   - what the model expects of itself (forecast.hpp);
 ///   - what differs between repetitions of the same commands (prediction_errors.hpp);
 ///   - what a flexible learner over all covariates together predicts (random_forest.hpp).

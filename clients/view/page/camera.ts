@@ -1,4 +1,4 @@
-// Which part of the arena the picture shows. The arena's y points up, the screen's down. Screen lengths are CSS pixels.
+// The part of the arena that the picture shows. The arena's y points up, the screen's down. Screen lengths are CSS pixels.
 
 const LEAST_PX_PER_MM = 0.002;
 const MOST_PX_PER_MM = 40;

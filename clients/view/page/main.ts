@@ -462,7 +462,7 @@ class Page {
     this.#buttons();
   }
 
-  // What the viewer does.
+  // Actions of the viewer.
 
   get #paused(): boolean {
     return this.#playback.live ? this.#status?.phase === "paused" : !this.#playback.playing;

@@ -1,4 +1,4 @@
-// What enters the run from outside: where trackers saw robots, and packets for the overhead controller.
+// External input of the run: where trackers saw robots, and packets for the overhead controller.
 import type { Point } from "./geometry.ts";
 import { element, setText } from "./panels.ts";
 import type { OutsideText } from "./protocol.ts";

@@ -1,4 +1,4 @@
-// What the gateway sends: JSON messages and binary frames. clients/view/frame_code.hpp and run_text.cpp write them.
+// Messages of the gateway: JSON messages and binary frames. clients/view/frame_code.hpp and run_text.cpp write them.
 
 export interface Group {
   first: number;

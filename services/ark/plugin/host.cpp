@@ -1,5 +1,5 @@
-/// A process of its own for one plugin: `host PLUGIN.so`, with a socket to the station as standard output. What the plugin
-/// prints goes to standard error. A fault, or the station's SIGUSR1 after a call without end, is reported in a last reply that
+/// A process of its own for one plugin: `host PLUGIN.so`, with a socket to the station as standard output. The plugin
+/// prints to standard error. A fault, or the station's SIGUSR1 after a call without end, is reported in a last reply that
 /// names the function; then the process ends.
 #include <dlfcn.h>
 #include <sys/resource.h>

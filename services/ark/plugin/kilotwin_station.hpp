@@ -57,7 +57,7 @@ class Point {
   double x_ = 0, y_ = 0;
 };
 
-/// What the tracker makes of a LED.
+/// The colour of a LED as the tracker reports it.
 enum lightColour : std::uint8_t { OFF = 0, RED = 1, GREEN = 2, BLUE = 3 };
 using kilobot_colour = lightColour;
 
@@ -124,7 +124,7 @@ class Archive {
   [[nodiscard]] bool saving() const { return saving_; }
   [[nodiscard]] const std::string& octets() const { return octets_; }
   [[nodiscard]] bool atEnd() const { return at_ == octets_.size(); }
-  /// What KilobotExperiment::serialize says unless a plugin overrides it.
+  /// KilobotExperiment::serialize calls it unless a plugin overrides that function.
   void setNotProvided() { provided_ = false; }
   [[nodiscard]] bool isProvided() const { return provided_; }
 
@@ -226,7 +226,7 @@ struct Colour {
   void serialize(Archive& archive) { archive& red& green& blue& alpha; }
 };
 
-/// What viewers draw under the robots: a raster over the whole arena, and circles on it.
+/// The picture that viewers draw under the robots: a raster over the whole arena, and circles on it.
 class Floor {
  public:
   static constexpr std::uint32_t kMostCells = 256;  ///< per side
@@ -267,7 +267,7 @@ class Floor {
 
 class KilobotEnvironment;
 
-/// What the station offers to a plugin. Plugins use it by the functions of KilobotExperiment and KilobotEnvironment.
+/// Services of the station to a plugin. Plugins use it by the functions of KilobotExperiment and KilobotEnvironment.
 class Services {
  public:
   virtual ~Services() = default;

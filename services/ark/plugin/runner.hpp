@@ -9,7 +9,7 @@
 
 namespace kilotwin::station {
 
-/// Which function of a plugin runs, for the line that tells of a crash. Read in a signal handler.
+/// The function of a plugin that runs, for the line that tells of a crash. Read in a signal handler.
 struct RunningCall {
   const char* function = nullptr;  ///< nullptr: none
   std::int32_t robot = -1;         ///< -1: of no robot

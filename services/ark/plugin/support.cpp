@@ -1,4 +1,4 @@
-/// What every plugin gets beside its sources: rand() of the C library draws from the station's stream.
+/// A source that is compiled into every plugin: rand() of the C library draws from the station's stream.
 #define KILOTWIN_STATION_NO_GLOBAL_NAMES
 #include "kilotwin_station.hpp"
 

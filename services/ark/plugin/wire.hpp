@@ -1,4 +1,4 @@
-/// What the station and a plugin's process say to each other. A frame is a length of 4 octets, least significant first, and an
+/// Messages between the station and a plugin's process. A frame is a length of 4 octets, least significant first, and an
 /// Archive of a Request or a Reply. Both ends run on one machine.
 #pragma once
 

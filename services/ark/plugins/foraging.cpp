@@ -1,7 +1,7 @@
 /// Foraging as ARK demonstrates it (demonstration C of Reina et al. 2017): virtual food, a virtual home, and robots that carry
 /// one load at a time. Meaning, units and defaults of the parameters: ForagingEnvironment in idl/experiment.proto.
 ///
-/// What a robot is sent: 0 inside its goal; 1..13 outside, 1 within 100 mm of its centre and one more for every 100 mm; 14 that
+/// Messages to a robot: 0 inside its goal; 1..13 outside, 1 within 100 mm of its centre and one more for every 100 mm; 14 that
 /// it has changed its goal, with 0 to the home and 1 to the food; 15 that no food is left. The data of 0..13 is the bearing of
 /// the goal's centre.
 ///
@@ -24,7 +24,7 @@ class ForagingEnvironment : public KilobotEnvironment {
   double scent_radius_mm = 0;
   std::uint32_t loads = 0;  ///< at the start
 
-  // What changes.
+  // State that changes during a run.
   std::uint32_t loads_left = 0, delivered = 0;
   std::vector<std::uint8_t> carries;  ///< per robot, 1: a load
 

@@ -40,7 +40,7 @@ class TrackedSwarm {
   /// The step from `now`: memberships take effect, and the next tick's state is that with the samples.
   void commit(std::span<const MembershipChange> memberships);
 
-  /// Which memberships should change, from the state with the samples.
+  /// The memberships that should change, from the state with the samples.
   void changes_due(std::vector<MembershipChange>& changes) const;
   /// Whether the robot takes part.
   [[nodiscard]] bool is_member(std::uint32_t robot) const;

@@ -151,7 +151,7 @@ TEST(FitState, ATrialOnACopyLeavesNoTrace) {
   trial.tracks.find_centres(trial.model, 2);
   fitter.fit(trial, 1);
   EXPECT_EQ(fitter.log_likelihood_of_all(state), likelihood);
-  // What the trial estimated of the tracks counts.
+  // The trial's own estimates of the tracks count.
   trial.model = state.model;
   EXPECT_GT(std::abs(fitter.log_likelihood_of_all(trial) - likelihood), 1);
   // Going back is assignment.

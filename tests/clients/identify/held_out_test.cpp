@@ -1,4 +1,4 @@
-// What is held out, and the last check on it.
+// Choice of the held-out data, and the last check on them.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -199,7 +199,7 @@ TEST_F(ImportTest, AnyFileIsReadOrRefused) {
     try {
       const std::string rows =
           is_ark ? rows_of_ark_log(folder_ / "from" / name) : rows_of_recording(folder_ / "from" / name);
-      // Whatever is accepted yields valid rows.
+      // A file that is accepted yields valid rows.
       os::write_file(folder_ / "to" / "trajectories.csv",
                      (is_ark ? "run,robot,time_s,x_mm,y_mm\n" : "run,robot,time_s,x_mm,y_mm,heading_rad\n") + rows);
       const MeasuredSet set = load_measured_set(folder_ / "to");

@@ -1,4 +1,4 @@
-// What is left unexplained is found, measured and shown; nothing is found in noise.
+// Unexplained errors are found, measured and shown; nothing is found in noise.
 #include "clients/identify/unexplained/unexplained.hpp"
 
 #include <gtest/gtest.h>

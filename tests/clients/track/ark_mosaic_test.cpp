@@ -111,8 +111,9 @@ TEST_F(ArkMosaics, LensAndSeamsAreCorrected) {
   EXPECT_EQ(found, scene_.robots.size());
   EXPECT_LT(corrected, 0.2);
   // The lens matters: without it robots are far off.
-  EXPECT_GT(error_mm(write_xml(cameras::ark_calibration_xml()), &strangers, &found), 2);
-  std::printf("four cameras with a lens: %.3f mm\n", corrected);
+  const double uncorrected = error_mm(write_xml(cameras::ark_calibration_xml()), &strangers, &found);
+  EXPECT_GT(uncorrected, 2);
+  std::printf("four cameras with a lens: %.3f mm; without the lens in the file: %.1f mm\n", corrected, uncorrected);
 }
 
 /// Four cameras in one place above the arena's middle, each turned to a quarter of it: what K and R of ARK's file describe.

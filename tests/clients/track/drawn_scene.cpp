@@ -25,7 +25,7 @@ void draw_body(cv::Mat& canvas, const DrawnRobot& robot, std::mt19937_64& random
   const double shade = std::uniform_real_distribution(60.0, 150.0)(random);
   cv::circle(canvas, fine(centre.x_px, centre.y_px), fine(0.68 * r), cv::Scalar(shade, shade, 0.96 * shade),
              cv::FILLED, cv::LINE_AA);
-  // What a dome mirrors of a lamp.
+  // The reflection of a lamp in the dome.
   cv::circle(canvas, fine(centre.x_px + 0.1 * r, centre.y_px - 0.1 * r), fine(0.09 * r), cv::Scalar(235, 238, 236),
              cv::FILLED, cv::LINE_AA);
 }

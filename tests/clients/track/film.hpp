@@ -24,7 +24,7 @@ struct Driver {
   [[nodiscard]] Pose pose() const;
 };
 
-/// What LEDs show.
+/// Brightness of the LEDs.
 enum class FilmLeds { kFull, kLevels, kOff };
 
 struct Film {

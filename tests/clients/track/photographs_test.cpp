@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 #include <utility>
@@ -80,6 +81,11 @@ Score score(const cv::Mat& picture, const std::vector<Marked>& truth) {
   return result;
 }
 
+void print(const char* photograph, const Score& s, std::size_t robots) {
+  std::printf("photograph, %s: %d of %zu robots found, %d wrong; LED as by eye: %d of %d\n", photograph, s.found,
+              robots, s.wrong, s.leds_right, s.leds);
+}
+
 cv::Mat photograph(const std::string& name) {
   return cv::imread((std::filesystem::path(KILOTWIN_SOURCES) / "../shared/data/images" / name).string());
 }
@@ -89,6 +95,7 @@ TEST(Photographs, SixRobotsOnADeskAndNothingElse) {
   if (picture.empty())
     GTEST_SKIP() << "there is no ../shared/data/images: the photographs are not part of the project";
   const Score result = score(picture, kDesk);
+  print("six on a desk, radius 24 px", result, kDesk.size());
   EXPECT_EQ(result.found, 6);
   EXPECT_EQ(result.wrong, 0);
   // One of the saturated LEDs has a glow between green and cyan.
@@ -101,6 +108,7 @@ TEST(Photographs, FiftySmallRobots) {
     GTEST_SKIP() << "there is no ../shared/data/images: the photographs are not part of the project";
   ASSERT_EQ(kFifty.size(), 50u);
   const Score result = score(picture, kFifty);
+  print("fifty, radius 7 px", result, kFifty.size());
   EXPECT_GE(result.found, 48);
   EXPECT_LE(result.wrong, 0);
   EXPECT_GE(result.leds_right, 42) << "of " << result.leds;

@@ -1,4 +1,4 @@
-// What the tests and measurements of the page share: Chromium, and processes of Kilotwin that print an address.
+// Shared parts of the tests and measurements of the page: Chromium, and processes of Kilotwin that print an address.
 import { spawn } from "node:child_process";
 import fs from "node:fs";
 import { createRequire } from "node:module";

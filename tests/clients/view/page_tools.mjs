@@ -1,4 +1,4 @@
-// What the tests of the page in Chromium share. A test gives the words of its command line:
+// Shared parts of the tests of the page in Chromium. A test gives the words of its command line:
 //   KILOTWIN VIEW SAMPLES NPM SOURCES [PICTURES]
 // With PICTURES, screenshots go to that directory. Status 77: there is no Chromium or playwright-core.
 import assert from "node:assert/strict";

@@ -49,7 +49,7 @@ try {
     assert.equal(protocol.rightMotorOn(frame.state[i]), robot.right);
   });
 
-  // What is no frame is refused, whatever its length.
+  // Data that are no frame are refused, whatever their length.
   for (let length = 0; length < data.byteLength; ++length) assert.equal(protocol.decodeFrame(data.slice(0, length)), undefined);
   const foreign = data.slice(0);
   new Uint8Array(foreign)[0] ^= 1;

@@ -312,7 +312,7 @@ TEST(RecordedCurves, ObservablesGrowWithTheRecordingAndEndAsThoseOfTheWhole) {
   RecordedRun fresh(scratch / "r.ktrec");
   const json expected = whole_plot(fresh, most);
   EXPECT_EQ(expected["time"].size(), 400u);
-  // What was told before the end was right; an answer holds for a second.
+  // The answers before the end were right; an answer holds for a second.
   for (std::size_t i = 0; i < before["time"].size(); ++i)
     ASSERT_EQ(before["values"][0][i], expected["values"][0][i]) << i;
   ASSERT_TRUE(test::eventually([&] { return whole_plot(run, most)["values"] == expected["values"]; }));

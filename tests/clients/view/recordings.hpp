@@ -76,7 +76,7 @@ inline proto::FloorRecord plain_floor(std::int64_t tick, char shade) {
   return floor;
 }
 
-/// What a tracker states of robots 0 to 9: standard deviations of 40 mm and 10 mm, the longer one along the diagonal.
+/// A tracker's statement of robots 0 to 9: standard deviations of 40 mm and 10 mm, the longer one along the diagonal.
 inline proto::TrackerRecord circling_sample(std::int64_t tick, std::uint32_t robots, double time_s) {
   proto::TrackerRecord sample;
   sample.set_tick(tick);

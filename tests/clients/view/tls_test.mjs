@@ -1,5 +1,5 @@
-// node tls_test.mjs KILOTWIN VIEW NPM SOURCES: the page beyond this machine, with a certificate that the test makes. What is not encrypted
-// is refused before anything is served. Status 77: the npm package ws or the program openssl is not there.
+// node tls_test.mjs KILOTWIN VIEW NPM SOURCES: the page beyond this machine, with a certificate that the test makes. A connection without
+// encryption is refused before anything is served. Status 77: the npm package ws or the program openssl is not there.
 import assert from "node:assert/strict";
 import { execFileSync, spawnSync } from "node:child_process";
 import fs from "node:fs";

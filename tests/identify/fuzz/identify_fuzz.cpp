@@ -40,7 +40,7 @@ std::string text_of(const fs::path& file) {
   return text.str();
 }
 
-/// What `kilotwin run --model` would say of the model; empty: it takes it.
+/// The error line of `kilotwin run --model` for the model; empty: it takes the model.
 std::string refusal_of_model(const fs::path& out) {
   std::ofstream(out / "program.c") << "int main(void) { return 0; }\n";
   std::ofstream(out / "experiment.txtpb") << "robots { count: 1 behaviour: 'program.c' }\n";
@@ -54,7 +54,7 @@ std::string refusal_of_model(const fs::path& out) {
   return {};
 }
 
-/// What is wrong with the files of a run that succeeded; empty: nothing.
+/// The fault of the files of a run that succeeded; empty: none.
 std::string fault_of_files(const fs::path& out) {
   for (const char* name : {"report.html", "model.txtpb", "result.json", "predictions.csv"})
     if (!fs::exists(out / name)) return fmt::format("{} is missing", name);
@@ -78,7 +78,7 @@ std::string fault_of_files(const fs::path& out) {
   return refusal_of_model(out);
 }
 
-/// What is wrong with a run; empty: nothing.
+/// The fault of a run; empty: none.
 std::string fault_of(int wait_status, const fs::path& out, const std::string& errors) {
   const int status = WIFEXITED(wait_status) ? WEXITSTATUS(wait_status) : 128 + WTERMSIG(wait_status);
   if (status == 124 || status == 137) return "does not end";

@@ -20,7 +20,7 @@ struct Row {
   double time_s, x_mm, y_mm, heading_rad;
 };
 
-/// What is common to all robots of a set.
+/// Properties that all robots of a set share.
 struct Layout {
   int robots, runs;
   double duration_s, sample_s, jitter, room_mm, noise_mm;

@@ -17,7 +17,7 @@ struct Pose {
   double heading_rad = 0;
 };
 
-/// What the commands of a robot say about it at a time.
+/// The part of a robot's state at a time that follows from its commands.
 Instant commanded(const std::vector<Order>& orders, double time_s) {
   Instant out;
   out.time_s = time_s;

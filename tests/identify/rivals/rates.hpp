@@ -1,4 +1,4 @@
-/// What rivals of `kilotwin identify` share: rates of motion from tracks with headings, and predictions by rates.
+/// Shared parts of the rivals of `kilotwin identify`: rates of motion from tracks with headings, and predictions by rates.
 /// Body frame: x ahead, y to the left. Rates: mm/s, mm/s, rad/s.
 #pragma once
 

@@ -16,7 +16,7 @@ struct Stance {
   double heading_rad = 0;
 };
 
-/// Which wheels a command drives.
+/// The wheels that a command drives.
 Wheels<bool> driven(Motion motion);
 
 Vec disc_of(const Scene& scene, const Stance& stance);

@@ -309,7 +309,7 @@ TEST(StationEngine, ForwardsPacketsFromOutsideInOrder) {
   }
 }
 
-/// What somebody external repeats goes on until somebody external ends it, where the station has nothing of its own to say.
+/// An external packet repeats until an external packet ends it, where the station has no packets of its own.
 TEST(StationEngine, DoesNotStopWhatComesFromOutside) {
   for (int when : {3, 8, 20}) {
     const RunPlan plan = plan_of(5);

@@ -135,7 +135,7 @@ TEST_F(TrackerInputs, VelocitiesMayBeLeftOutButNotHalfOfThem) {
   EXPECT_EQ(frames, (std::set<std::uint64_t>{1}));
 }
 
-/// Whatever outsiders write, the station goes on, and what it takes is usable.
+/// Samples of any content leave the station running, and those that it takes are usable.
 TEST_F(TrackerInputs, OfAnyContentAreSurvived) {
   std::mt19937_64 random(5);
   const auto below = [&](std::uint64_t limit) { return random() % limit; };

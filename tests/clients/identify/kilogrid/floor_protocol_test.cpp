@@ -1,4 +1,4 @@
-// Which days fit, choose and report; which model is written; and what is noted of reported days.
+// The days that fit, choose and report; the model that is written; and the notes about reported days.
 #include "clients/identify/kilogrid/floor_protocol.hpp"
 
 #include <gtest/gtest.h>

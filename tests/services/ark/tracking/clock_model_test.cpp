@@ -110,7 +110,7 @@ TEST(ClockModel, IsExactWithoutQueues) {
   EXPECT_NEAR(model.drift_ppm(), -50, 0.1);
 }
 
-/// What no one-way measurement can tell: the least delay goes into the stamp, whole.
+/// A limit of every one-way measurement: the least delay goes into the stamp, whole.
 TEST(ClockModel, TheLeastDelayStaysInTheStamp) {
   Source source;
   source.queueing_s = 0;
