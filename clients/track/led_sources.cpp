@@ -183,6 +183,22 @@ class Fit {
   std::array<Tint, kMostSources> light_;
 };
 
+/// The bearings that are tried.
+struct Direction {
+  double bearing_rad, cos, sin;
+};
+const std::array<Direction, kBearings>& directions() {
+  static const std::array<Direction, kBearings> table = [] {
+    std::array<Direction, kBearings> made{};
+    for (std::size_t i = 0; i < kBearings; ++i) {
+      const double bearing_rad = 2 * kPi * static_cast<double>(i) / kBearings;
+      made[i] = {bearing_rad, std::cos(bearing_rad), std::sin(bearing_rad)};
+    }
+    return made;
+  }();
+  return table;
+}
+
 class Sources {
  public:
   Sources(const Light& light, const Circle& disc, const std::vector<Circle>& near) : disc_(disc) {
@@ -230,10 +246,9 @@ class Sources {
  private:
   void add_robot(double x, double y, double radius) {
     std::vector<Place>& ring = places_.emplace_back();
-    for (int i = 0; i < kBearings; ++i) {
-      const double bearing = 2 * kPi * i / kBearings;
-      const double at_x = x + kLedAt * radius * std::cos(bearing), at_y = y - kLedAt * radius * std::sin(bearing);
-      if (std::hypot(at_x, at_y) < kLedAt + kClose) ring.push_back({at_x, at_y, bearing});
+    for (const Direction& to : directions()) {
+      const double at_x = x + kLedAt * radius * to.cos, at_y = y - kLedAt * radius * to.sin;
+      if (squared(at_x) + squared(at_y) < squared(kLedAt + kClose)) ring.push_back({at_x, at_y, to.bearing_rad});
     }
   }
 
