@@ -1,4 +1,7 @@
-// Speed of the tracker: robots that drive, rendered at 1920x1080, with noise. Usage: track_bench [ROBOTS [FRAMES]]
+// Speed of the tracker on rendered pictures of 1920x1080 with noise. Usage: track_bench [ROBOTS [FRAMES [PITCH_mm]]]
+//
+// Without a pitch the robots drive in circles, far from each other. With one they are in a jam: a hexagonal packing in which every
+// robot turns in place and shakes. At 33 mm discs touch.
 //
 // The pictures are made beforehand and packed as JPEG, as a camera would deliver them. Measured are unpacking and tracking, each on
 // one thread; `kilotwin track` runs them side by side.
@@ -38,6 +41,16 @@ struct Times {
   }
 };
 
+/// Robot i of a jam at a time. Its centre shakes by a tenth of a millimetre; pushed robots turn at about 0.5 rad/s.
+kilotwin::Pose jammed_pose_at(int i, int robots, double pitch_mm, double t) {
+  const int columns = static_cast<int>(std::ceil(std::sqrt(robots)));
+  const int column = i % columns, row = i / columns;
+  const double angle = 0.5 * (i % 2 == 0 ? 1 : -1) * t + 2.4 * i;
+  const double x = pitch_mm * (column - 0.5 * columns + 0.5 * (row % 2)) + 0.1 * std::cos(3 * t + i);
+  const double y = pitch_mm * std::sqrt(0.75) * (row - 0.5 * columns) + 0.1 * std::sin(4 * t + i);
+  return {x, y, kilotwin::wrapped(std::remainder(angle, 2 * kilotwin::kPi))};
+}
+
 /// Robot i of a film at a time: a circle of its own radius at 10 mm/s.
 kilotwin::Pose pose_at(int i, double t) {
   const double radius = 15.0 + i % 7, angle = 10 * t / radius + i;
@@ -53,6 +66,7 @@ int main(int count, char** words) {
   cv::setNumThreads(1);
   const int robots = count > 1 ? std::atoi(words[1]) : 100;
   const int frames = count > 2 ? std::atoi(words[2]) : 150;
+  const double pitch_mm = count > 3 ? std::atof(words[3]) : 0;
   proto::Experiment experiment;
   experiment.mutable_arena()->set_width_mm(2200);
   experiment.mutable_arena()->set_height_mm(1200);
@@ -69,7 +83,8 @@ int main(int count, char** words) {
     for (int i = 0; i < robots; ++i) {
       cameras::RobotView view;
       view.robot = static_cast<std::uint32_t>(i);
-      view.pose = pose_at(i, frame * kFrame_s);
+      const double t = frame * kFrame_s;
+      view.pose = pitch_mm > 0 ? jammed_pose_at(i, robots, pitch_mm, t) : pose_at(i, t);
       view.led = static_cast<std::uint8_t>(3 << (2 * (i % 3)));
       scene.robots.push_back(view);
     }

@@ -1,13 +1,18 @@
 // The errors of a camera tracker over minutes, in the terms of the station's camera model (station { camera { } }): a run's own
-// trajectories are rendered as pictures of ARK's scale and tracked. Usage: tracker_errors TRAJECTORIES.csv
+// trajectories are rendered as pictures of ARK's scale and tracked. Usage: tracker_errors NAME TRAJECTORIES.csv SIDE_mm
 //
-// The table comes from `kilotwin export --trajectories --every 0.1`. bench/camera-model makes it, and writes the page.
+// Prints a row of a table. The trajectories come from `kilotwin export --trajectories --every PERIOD`; there is a picture for each of
+// their times. SIDE_mm: of the arena. bench/camera-model makes the trajectories, and writes the page.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <ctime>
 #include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "clients/cameras/renderer.hpp"
@@ -20,10 +25,12 @@ namespace {
 
 using namespace kilotwin;
 
-constexpr double kSide_mm = 2000, kPixelsPerMm = 1;
+constexpr double kPixelsPerMm = 1;
+constexpr double kMargin_mm = 50;        ///< around the arena, in the picture
 constexpr double kMatch_mm = 8;          ///< a track farther away is not this robot's
 constexpr double kSwapDistance_mm = 40;  ///< default of the camera model
-constexpr double kSettled_s = 2;         ///< from the first picture; the tracker has its robots then
+constexpr double kSettled_s =
+    10;  ///< from the first picture; the tracker has its robots then, and headings of those that drive
 
 struct Seen {
   Pose pose;
@@ -53,8 +60,9 @@ struct Robot {
 };
 
 struct Tally {
-  double robot_s = 0, close_pair_s = 0, missed_s = 0, square_mm = 0, heading_rad = 0, cpu_s = 0;
-  long sightings = 0, headings = 0, losses = 0, swaps = 0, leds = 0, led_wrong = 0, frames = 0;
+  double robot_s = 0, close_pair_s = 0, missed_s = 0, square_mm = 0, heading_rad = 0;
+  long sightings = 0, headings = 0, losses = 0, swaps = 0, led_wrong = 0, late = 0;
+  std::vector<double> cpu_ms;  ///< of each picture
 };
 
 class Judge {
@@ -96,7 +104,6 @@ class Judge {
       tally.heading_rad += std::abs(wrapped(heading->heading_rad - truth.pose.heading_rad));
       ++tally.headings;
     }
-    ++tally.leds;
     tally.led_wrong += track::bits_of(*mine->led_read) != truth.led ? 1 : 0;
     const bool was_anothers = std::any_of(robots_.begin(), robots_.end(), [&](const Robot& other) {
       return &other != &robot && other.track == mine->id;
@@ -114,40 +121,48 @@ double cpu_s() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-void print(const Tally& t) {
-  const double hours = t.robot_s / 3600, pair_hours = t.close_pair_s / 3600;
-  std::printf("| quantity | field | measured |\n|---|---|---|\n");
-  std::printf("| frames, robot-hours | | %ld, %.2f |\n", t.frames, hours);
-  std::printf("| position, root mean square along one axis, mm | `position_noise_mm` | %.3f |\n",
-              std::sqrt(t.square_mm / static_cast<double>(2 * std::max(1L, t.sightings))));
-  std::printf("| heading, mean absolute error, degrees | from motion, LED and body | %.2f |\n",
-              180 / kPi * t.heading_rad / static_cast<double>(std::max(1L, t.headings)));
-  std::printf("| class of a LED wrong in one picture | `led_error` | %.5f |\n",
-              static_cast<double>(t.led_wrong) / static_cast<double>(std::max(1L, t.leds)));
-  // The standard errors of rates are those of Poisson counts.
-  std::printf("| losses per robot and hour | `losses_per_hour` | %.2f +- %.2f |\n",
-              static_cast<double>(t.losses) / hours, std::sqrt(static_cast<double>(t.losses)) / hours);
-  std::printf("| mean length of a loss, s | `lost_s` | %.2f |\n",
-              t.losses == 0 ? 0 : t.missed_s / static_cast<double>(t.losses));
-  std::printf("| exchanges per hour of a pair closer than 40 mm (%.2f h) | `swaps_per_hour` | %.2f |\n", pair_hours,
-              pair_hours > 0 ? 0.5 * static_cast<double>(t.swaps) / pair_hours : 0);
-  std::printf("| processor time per picture, s | a part of `latency_s` | %.3f |\n",
-              t.cpu_s / static_cast<double>(std::max(1L, t.frames)));
+/// A rate of independent events: count per `unit`, and the 95 % interval of Poisson counts by Byar's approximation (Breslow and
+/// Day 1987).
+std::string rate(long count, double units) {
+  constexpr double kNormal975 = 1.959964;
+  const auto k = static_cast<double>(count);
+  const auto bound = [](double n, double z) {
+    const double root = 1 - 1 / (9 * n) + z / (3 * std::sqrt(n));
+    return n * root * root * root;
+  };
+  const double low = count == 0 ? 0 : bound(k, -kNormal975), high = bound(k + 1, kNormal975);
+  if (units <= 0) return "";
+  return fmt::format("{:.2g} ({:.2g} to {:.2g})", k / units, low / units, high / units);
+}
+
+void print(const char* name, Tally t) {
+  std::sort(t.cpu_ms.begin(), t.cpu_ms.end());
+  const auto frames = static_cast<double>(std::max<std::size_t>(1, t.cpu_ms.size()));
+  double cpu_ms = 0;
+  for (const double one : t.cpu_ms) cpu_ms += one;
+  fmt::print("| {} | {:.2f} | {:.3f} | {:.1f} | {} | {} | {:.2f} | {} | {:.3g} | {:.0f}, {:.0f} | {} |\n", name,
+             t.robot_s / 3600, std::sqrt(t.square_mm / static_cast<double>(2 * std::max(1L, t.sightings))),
+             180 / kPi * t.heading_rad / static_cast<double>(std::max(1L, t.headings)),
+             rate(t.led_wrong, static_cast<double>(t.sightings)), rate(t.losses, t.robot_s / 3600),
+             t.losses == 0 ? 0 : t.missed_s / static_cast<double>(t.losses),
+             rate(t.swaps / 2, t.close_pair_s / 3600), t.close_pair_s / 3600, cpu_ms / frames,
+             t.cpu_ms.empty() ? 0 : t.cpu_ms[t.cpu_ms.size() * 99 / 100], rate(t.late, frames));
 }
 
 }  // namespace
 
 int main(int count, char** words) {
-  if (count != 2) {
-    std::fprintf(stderr, "usage: tracker_errors TRAJECTORIES.csv\n");
+  if (count != 4) {
+    std::fprintf(stderr, "usage: tracker_errors NAME TRAJECTORIES.csv SIDE_mm\n");
     return 2;
   }
   cv::setNumThreads(1);
-  const Frames frames = frames_of(words[1]);
+  const Frames frames = frames_of(words[2]);
+  const double side_mm = std::atof(words[3]);
   proto::Experiment experiment;
-  experiment.mutable_arena()->set_width_mm(kSide_mm);
-  experiment.mutable_arena()->set_height_mm(kSide_mm);
-  const auto side_px = static_cast<int>(kSide_mm * kPixelsPerMm);
+  experiment.mutable_arena()->set_width_mm(side_mm);
+  experiment.mutable_arena()->set_height_mm(side_mm);
+  const auto side_px = static_cast<int>((side_mm + 2 * kMargin_mm) * kPixelsPerMm);
   cameras::CameraModel camera = cameras::CameraModel::overhead(side_px, side_px, kPixelsPerMm);
   camera.read_noise = 3;
   camera.uneven_light = 0.2;
@@ -174,11 +189,11 @@ int main(int count, char** words) {
     const double took_s = cpu_s() - begun_s;
     if (time_s >= frames.begin()->first + kSettled_s) {
       judge.look(robots, time_s - last_s, tracker);
-      judge.tally.cpu_s += took_s;
-      ++judge.tally.frames;
+      judge.tally.cpu_ms.push_back(1e3 * took_s);
+      judge.tally.late += took_s > time_s - last_s ? 1 : 0;
     }
     last_s = time_s;
   }
-  print(judge.tally);
+  print(words[1], judge.tally);
   return 0;
 }

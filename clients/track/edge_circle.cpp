@@ -14,6 +14,13 @@ namespace {
 
 constexpr double kInner = 0.55, kOuter = 1.5;  ///< part of the rays that is looked at, in radii
 constexpr int kMostSamples = 96;
+/// The fit's last steps look for edges within this share of the radius.
+constexpr double kLeastTolerance = 0.16;
+/// The fit ends when a step moves the centre and changes the radius by less than this, px: a quarter of the least error of a centre.
+constexpr double kConverged_px = 0.004;
+
+// Not std::hypot(), which is several times slower: coordinates of pixels do not overflow.
+double length_of(double x, double y) { return std::sqrt(x * x + y * y); }
 
 /// Unit vectors of the rays.
 struct Ray {
@@ -46,6 +53,10 @@ class Patch {
     cv::LUT(grey(inside), log_table(), pixels_);
     const double sigma = std::max(0.6, 0.045 * guess.radius_px);
     cv::GaussianBlur(pixels_, pixels_, cv::Size(), sigma, sigma, cv::BORDER_REPLICATE);
+    first_ = pixels_.ptr<float>();
+    row_length_ = static_cast<int>(pixels_.step1());
+    right_ = pixels_.cols - 1.001;
+    bottom_ = pixels_.rows - 1.001;
   }
   [[nodiscard]] bool empty() const { return pixels_.empty(); }
   /// Whether the point lies in the picture.
@@ -56,17 +67,20 @@ class Patch {
   }
   /// Bilinear; the nearest pixel's outside.
   [[nodiscard]] float at(double x, double y) const {
-    x = std::clamp(x - origin_.x_px, 0.0, static_cast<double>(pixels_.cols) - 1.001);
-    y = std::clamp(y - origin_.y_px, 0.0, static_cast<double>(pixels_.rows) - 1.001);
+    x = std::clamp(x - origin_.x_px, 0.0, right_);
+    y = std::clamp(y - origin_.y_px, 0.0, bottom_);
     const int column = static_cast<int>(x), row = static_cast<int>(y);
     const auto u = static_cast<float>(x - column), v = static_cast<float>(y - row);
-    const float* upper = pixels_.ptr<float>(row) + column;
-    const float* lower = pixels_.ptr<float>(row + 1) + column;
+    const float* upper = first_ + row * row_length_ + column;
+    const float* lower = upper + row_length_;
     return (1 - v) * ((1 - u) * upper[0] + u * upper[1]) + v * ((1 - u) * lower[0] + u * lower[1]);
   }
 
  private:
   cv::Mat pixels_;
+  const float* first_ = nullptr;
+  int row_length_ = 0;
+  double right_ = 0, bottom_ = 0;  ///< the last places between two pixels
   Point origin_;
 };
 
@@ -139,7 +153,7 @@ Circle improved(const Circle& circle, const std::array<EdgePoint, kRays>& points
   for (const EdgePoint& p : points) {
     if (p.there)
       distances.push_back(
-          std::abs(std::hypot(p.at.x_px - circle.centre.x_px, p.at.y_px - circle.centre.y_px) - circle.radius_px));
+          std::abs(length_of(p.at.x_px - circle.centre.x_px, p.at.y_px - circle.centre.y_px) - circle.radius_px));
   }
   if (distances.size() < 8) return circle;
   // Tukey's weights, scaled by the median distance.
@@ -149,7 +163,7 @@ Circle improved(const Circle& circle, const std::array<EdgePoint, kRays>& points
   for (const EdgePoint& p : points) {
     if (!p.there) continue;
     const double dx = p.at.x_px - circle.centre.x_px, dy = p.at.y_px - circle.centre.y_px;
-    const double length = std::hypot(dx, dy);
+    const double length = length_of(dx, dy);
     const double off = length - circle.radius_px;
     if (std::abs(off) >= bound || length < 1e-9) continue;
     const double share = off / bound;
@@ -201,12 +215,12 @@ void mark_hidden(std::array<EdgePoint, kRays>& points, const Patch& patch, const
   }
   for (const Circle& other : neighbours) {
     const double dx = other.centre.x_px - circle.centre.x_px, dy = other.centre.y_px - circle.centre.y_px;
-    const double distance = std::hypot(dx, dy);
+    const double distance = length_of(dx, dy);
     if (distance < 0.5 * r || distance > 2.8 * r) continue;
     // Where the neighbour's disc comes closer to this one than a quarter of a radius, blur may close the gap.
     for (std::size_t i = 0; i < kRays; ++i) {
       const double x = 1.2 * r * rays()[i].cos - dx, y = 1.2 * r * rays()[i].sin - dy;
-      if (std::hypot(x, y) < 1.1 * other.radius_px) points[i].hidden = true;
+      if (length_of(x, y) < 1.1 * other.radius_px) points[i].hidden = true;
     }
   }
 }
@@ -226,11 +240,16 @@ std::optional<FittedCircle> fit_circle(const cv::Mat& grey, const Circle& guess,
     const Circle next = improved(circle, points);
     const double least = guess.radius_px * (1 - limits.radius_tolerance);
     const double most = guess.radius_px * (1 + limits.radius_tolerance);
+    const Circle before = circle;
     circle = {next.centre, std::clamp(next.radius_px, least, most)};
-    if (std::hypot(circle.centre.x_px - guess.centre.x_px, circle.centre.y_px - guess.centre.y_px) >
+    if (length_of(circle.centre.x_px - guess.centre.x_px, circle.centre.y_px - guess.centre.y_px) >
         0.6 * guess.radius_px)
       return std::nullopt;
-    tolerance = std::max(0.16, 0.7 * tolerance);
+    const double change_px =
+        length_of(circle.centre.x_px - before.centre.x_px, circle.centre.y_px - before.centre.y_px) +
+        std::abs(circle.radius_px - before.radius_px);
+    if (tolerance <= kLeastTolerance && change_px < kConverged_px) break;
+    tolerance = std::max(kLeastTolerance, 0.7 * tolerance);
   }
   mark_hidden(points, patch, circle, limits.neighbours);
   FittedCircle fitted;
@@ -241,8 +260,7 @@ std::optional<FittedCircle> fit_circle(const cv::Mat& grey, const Circle& guess,
   int visible = 0;
   for (std::size_t i = 0; i < kRays; ++i) {
     const EdgePoint& p = points[i];
-    const double off =
-        std::hypot(p.at.x_px - circle.centre.x_px, p.at.y_px - circle.centre.y_px) - circle.radius_px;
+    const double off = length_of(p.at.x_px - circle.centre.x_px, p.at.y_px - circle.centre.y_px) - circle.radius_px;
     const bool on_circle = p.there && std::abs(off) < 0.07 * circle.radius_px + 0.3;
     if (on_circle || !p.hidden) ++visible;
     if (!on_circle) continue;

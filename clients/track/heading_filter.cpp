@@ -155,8 +155,6 @@ void HeadingFilter::predict_turned(Hypothesis& h, double dt_s) {
 
 void HeadingFilter::predict(double dt_s) {
   for (std::size_t i = 0; i < kModes; ++i) {
-    // A hypothesis without weight is made anew by mix() before it counts again.
-    if (weights_[i] == 0) continue;
     Hypothesis& h = hypotheses_[i];
     if (i == kHeld) {
       predict_held(h, dt_s);
@@ -212,7 +210,6 @@ void HeadingFilter::correct(Hypothesis& h, const Vector& change, bool turns) {
 void HeadingFilter::measure(double x_mm, double y_mm, double sd_mm) {
   std::array<double, kModes> likelihoods{};
   for (std::size_t i = 0; i < kModes; ++i) {
-    if (weights_[i] == 0) continue;
     Hypothesis& h = hypotheses_[i];
     Eigen::Matrix2d total = h.covariance.topLeftCorner<2, 2>();
     total.diagonal().array() += sd_mm * sd_mm;

@@ -1,9 +1,9 @@
 #include "clients/track/led_sources.hpp"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <iterator>
 #include <utility>
 
 #include "core/base/pose.hpp"
@@ -25,6 +25,8 @@ constexpr double kClose = 0.8;
 constexpr int kRounds = 3;
 /// Share that is added to the squares of each source, as sources in nearly the same place cannot be separated.
 constexpr double kRidge = 0.02;
+/// Sources that are fitted together at most: discs that touch a disc are six.
+constexpr std::size_t kMostSources = 12;
 
 double falloff(double radii) {
   if (radii >= kFalloffReach) return 0;
@@ -32,6 +34,31 @@ double falloff(double radii) {
   return (1 - kGlowShare) * std::exp(-0.5 * radii * radii / (kPicture * kPicture)) +
          kGlowShare * std::exp(-radii / kGlow) * std::min(1.0, 3 * fade);
 }
+
+/// falloff() by the squared distance: a table, linear between its entries.
+class Falloffs {
+ public:
+  static const Falloffs& get() {
+    static const Falloffs falloffs;
+    return falloffs;
+  }
+  /// 0 <= radii2 <= kFalloffReach^2, and rounding.
+  [[nodiscard]] double at(double radii2) const {
+    const double place = radii2 * kPerSquare;
+    const int whole = static_cast<int>(place);
+    const double* const entry = table_.data() + whole;
+    return entry[0] + (place - whole) * (entry[1] - entry[0]);
+  }
+
+ private:
+  static constexpr std::size_t kEntries = 2048;
+  static constexpr double kPerSquare = kEntries / (kFalloffReach * kFalloffReach);
+  Falloffs() {
+    for (std::size_t i = 0; i < table_.size(); ++i)
+      table_[i] = falloff(std::sqrt(static_cast<double>(i) / kPerSquare));
+  }
+  std::array<double, kEntries + 2> table_;
+};
 
 /// Scalar products of two falloffs by the distance of their sources, in squared radii: a table.
 class Overlaps {
@@ -90,7 +117,87 @@ struct Place {
   double x, y, bearing_rad;
   Tint matched = Tint::Zero();  ///< scalar product of its falloff and the light
 };
-double apart(const Place& a, const Place& b) { return std::hypot(a.x - b.x, a.y - b.y); }
+double apart(const Place& a, const Place& b) { return std::sqrt(squared(a.x - b.x) + squared(a.y - b.y)); }
+
+/// Scalar product of the falloffs of two sources, squared radii.
+double overlap(const Place& a, const Place& b) { return Overlaps::get().at(apart(a, b)); }
+double own_overlap() { return Overlaps::get().at(0); }
+
+/// The least squares fit of some sources, as a Cholesky factor of its normal equations. What a further source would explain costs
+/// one triangular solve.
+class Fit {
+ public:
+  explicit Fit(double pixels) : pixels_(pixels) {}
+
+  /// What the sources of the fit leave of a further one.
+  struct Rest {
+    const Place* place;
+    std::array<double, kMostSources> solved;  ///< its products with the sources, divided by the factor
+    Tint light;                               ///< the light that it matches
+    double square;                            ///< its product with itself
+    [[nodiscard]] double gain() const { return light.squaredNorm() / square; }
+  };
+  [[nodiscard]] Rest rest_of(const Place& place) const {
+    Rest rest{&place, {}, place.matched, pixels_ * own_overlap() * (1 + kRidge)};
+    for (std::size_t i = 0; i < count_; ++i) {
+      double left = pixels_ * overlap(place, *sources_[i].place);
+      for (std::size_t j = 0; j < i; ++j) left -= sources_[i].solved[j] * rest.solved[j];
+      rest.solved[i] = left / diagonal_[i];
+      rest.light -= rest.solved[i] * light_[i];
+      rest.square -= rest.solved[i] * rest.solved[i];
+    }
+    return rest;
+  }
+  void add(const Place& place) {
+    sources_[count_] = rest_of(place);
+    diagonal_[count_] = std::sqrt(sources_[count_].square);
+    light_[count_] = sources_[count_].light / diagonal_[count_];
+    gain_ += sources_[count_].gain();
+    ++count_;
+  }
+  /// Squares that the sources explain; with a further one; with two.
+  [[nodiscard]] double gain() const { return gain_; }
+  [[nodiscard]] double gain_with(const Place& place) const { return gain_ + rest_of(place).gain(); }
+  [[nodiscard]] double gain_with(const Rest& a, const Rest& b) const {
+    double product = pixels_ * overlap(*a.place, *b.place);
+    for (std::size_t i = 0; i < count_; ++i) product -= a.solved[i] * b.solved[i];
+    const double share = product / a.square;
+    return gain_ + a.gain() + (b.light - share * a.light).squaredNorm() / (b.square - share * product);
+  }
+  /// The light of each source, in the order in which they were added.
+  [[nodiscard]] std::vector<Tint> light() const {
+    std::vector<Tint> light(light_.begin(), light_.begin() + static_cast<std::ptrdiff_t>(count_));
+    for (std::size_t i = count_; i-- > 0;) {
+      for (std::size_t j = i + 1; j < count_; ++j) light[i] -= sources_[j].solved[i] * light[j];
+      light[i] /= diagonal_[i];
+    }
+    return light;
+  }
+
+ private:
+  double pixels_;  ///< of the grid per squared radius
+  double gain_ = 0;
+  std::size_t count_ = 0;
+  std::array<Rest, kMostSources> sources_;
+  std::array<double, kMostSources> diagonal_;
+  std::array<Tint, kMostSources> light_;
+};
+
+/// The bearings that are tried.
+struct Direction {
+  double bearing_rad, cos, sin;
+};
+const std::array<Direction, kBearings>& directions() {
+  static const std::array<Direction, kBearings> table = [] {
+    std::array<Direction, kBearings> made{};
+    for (std::size_t i = 0; i < kBearings; ++i) {
+      const double bearing_rad = 2 * kPi * static_cast<double>(i) / kBearings;
+      made[i] = {bearing_rad, std::cos(bearing_rad), std::sin(bearing_rad)};
+    }
+    return made;
+  }();
+  return table;
+}
 
 class Sources {
  public:
@@ -98,9 +205,11 @@ class Sources {
     const double per_radius = disc.radius_px / light.stride;
     pixels_ = per_radius * per_radius;
     add_robot(0, 0, 1);
-    for (const Circle& other : near)
+    for (const Circle& other : near) {
+      if (places_.size() == kMostSources) break;
       add_robot((other.centre.x_px - disc.centre.x_px) / disc.radius_px,
                 (other.centre.y_px - disc.centre.y_px) / disc.radius_px, other.radius_px / disc.radius_px);
+    }
     match(light, disc);
     chosen_.assign(places_.size(), nullptr);
   }
@@ -117,74 +226,90 @@ class Sources {
 
   [[nodiscard]] std::optional<LedSource> own() const {
     if (chosen_[0] == nullptr) return std::nullopt;
-    const Fit fit = fitted();
-    const Eigen::MatrixX3d& light = fit.light;
-    const std::vector<const Place*>& places = fit.places;
-    double least = kLeastSource;
-    for (Eigen::Index i = 1; i < light.rows(); ++i)
-      least += kUnknown * light.row(i).norm() *
-               Overlaps::get().at(apart(*places[0], *places[static_cast<std::size_t>(i)])) / Overlaps::get().at(0);
-    if (light.row(0).norm() < least) return std::nullopt;
+    const std::vector<Tint> light = fit_without(kMostSources).light();
     LedSource source;
+    double least = kLeastSource;
+    std::size_t i = 0;
+    for (std::size_t robot = 1; robot < chosen_.size(); ++robot) {
+      if (chosen_[robot] == nullptr) continue;
+      source.others.push_back(pixel(chosen_[robot]->x, chosen_[robot]->y));
+      least += kUnknown * light[++i].norm() * overlap(*chosen_[0], *chosen_[robot]) / own_overlap();
+    }
+    if (light[0].norm() < least) return std::nullopt;
     const double bearing_rad = refined_bearing();
     source.at = pixel(kLedAt * std::cos(bearing_rad), -kLedAt * std::sin(bearing_rad));
-    for (std::size_t i = 1; i < places.size(); ++i) source.others.push_back(pixel(places[i]->x, places[i]->y));
-    source.colour = colour_of(light.row(0));
-    source.white = std::max(0.0, light(0, 2));
+    source.colour = colour_of(light[0]);
+    source.white = std::max(0.0, light[0](2));
     return source;
   }
 
  private:
   void add_robot(double x, double y, double radius) {
     std::vector<Place>& ring = places_.emplace_back();
-    for (int i = 0; i < kBearings; ++i) {
-      const double bearing = 2 * kPi * i / kBearings;
-      const double at_x = x + kLedAt * radius * std::cos(bearing), at_y = y - kLedAt * radius * std::sin(bearing);
-      if (std::hypot(at_x, at_y) < kLedAt + kClose) ring.push_back({at_x, at_y, bearing});
+    for (const Direction& to : directions()) {
+      const double at_x = x + kLedAt * radius * to.cos, at_y = y - kLedAt * radius * to.sin;
+      if (squared(at_x) + squared(at_y) < squared(kLedAt + kClose)) ring.push_back({at_x, at_y, to.bearing_rad});
     }
   }
 
+  /// A pixel with light, its column in the grid.
+  struct Lit {
+    int column;
+    double u, v, white;  ///< Tint
+  };
+
   void match(const Light& light, const Circle& disc) {
+    std::vector<Lit> lit;
+    std::vector<std::size_t> rows{0};  // where the pixels of each row begin
     for (int row = 0; row < light.rows; ++row) {
       for (int column = 0; column < light.columns; ++column) {
         const std::size_t i = light.index(column, row);
         if (light.anyones[i] <= 0) continue;
         const Tint tint = tint_of(light, i);
-        const double x = (light.left + column * light.stride - disc.centre.x_px) / disc.radius_px;
-        const double y = (light.top + row * light.stride - disc.centre.y_px) / disc.radius_px;
-        for (std::vector<Place>& ring : places_) {
-          for (Place& place : ring) place.matched += falloff(std::hypot(place.x - x, place.y - y)) * tint;
-        }
+        lit.push_back({column, tint(0), tint(1), tint(2)});
       }
+      rows.push_back(lit.size());
+    }
+    const double step = light.stride / disc.radius_px;  // between two pixels of the grid, radii
+    const double left = (light.left - disc.centre.x_px) / disc.radius_px,
+                 top = (light.top - disc.centre.y_px) / disc.radius_px;
+    for (std::vector<Place>& ring : places_) {
+      for (Place& place : ring)
+        place.matched = matched_at((place.x - left) / step, (place.y - top) / step, step, lit, rows);
     }
   }
 
-  struct Fit {
-    std::vector<const Place*> places;  ///< of the chosen sources; the own one first, if it is chosen
-    Eigen::MatrixX3d light;            ///< of each source
-    double gain = 0;                   ///< squares that the sources explain
-  };
-  /// All chosen sources together, by least squares.
-  [[nodiscard]] Fit fitted() const {
-    Fit fit;
-    std::copy_if(chosen_.begin(), chosen_.end(), std::back_inserter(fit.places),
-                 [](const Place* place) { return place != nullptr; });
-    const auto count = static_cast<Eigen::Index>(fit.places.size());
-    Eigen::MatrixXd products(count, count);
-    Eigen::MatrixX3d matched(count, 3);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const Place& a = *fit.places[static_cast<std::size_t>(i)];
-      matched.row(i) = a.matched;
-      for (Eigen::Index j = 0; j <= i; ++j)
-        products(i, j) = products(j, i) =
-            pixels_ * Overlaps::get().at(apart(a, *fit.places[static_cast<std::size_t>(j)]));
-      products(i, i) *= 1 + kRidge;
+  /// Scalar product of the light and the falloff of a source at a column and a row of the grid.
+  static Tint matched_at(double column, double row, double step, const std::vector<Lit>& lit,
+                         const std::vector<std::size_t>& rows) {
+    const Falloffs& falloffs = Falloffs::get();
+    const double reach = kFalloffReach / step, reach2 = reach * reach, step2 = step * step;
+    const int first = std::max(0, static_cast<int>(std::ceil(row - reach)));
+    const int last = std::min(static_cast<int>(rows.size()) - 2, static_cast<int>(std::floor(row + reach)));
+    double u = 0, v = 0, white = 0;
+    for (int y = first; y <= last; ++y) {
+      const double down2 = squared(y - row);
+      const Lit* const end = lit.data() + rows[static_cast<std::size_t>(y) + 1];
+      for (const Lit* pixel = lit.data() + rows[static_cast<std::size_t>(y)]; pixel != end; ++pixel) {
+        const double apart2 = squared(pixel->column - column) + down2;
+        if (apart2 >= reach2) continue;
+        const double share = falloffs.at(step2 * apart2);
+        u += share * pixel->u;
+        v += share * pixel->v;
+        white += share * pixel->white;
+      }
     }
-    fit.light = products.llt().solve(matched);
-    fit.gain = fit.light.cwiseProduct(matched).sum();
+    return {u, v, white};
+  }
+
+  /// The fit of all chosen sources but those of two robots.
+  [[nodiscard]] Fit fit_without(std::size_t robot, std::size_t another = kMostSources) const {
+    Fit fit(pixels_);
+    for (std::size_t i = 0; i < chosen_.size(); ++i) {
+      if (i != robot && i != another && chosen_[i] != nullptr) fit.add(*chosen_[i]);
+    }
     return fit;
   }
-  [[nodiscard]] double gain() const { return fitted().gain; }
 
   /// Robots by their light: the strongest source explains what it can before others are placed.
   [[nodiscard]] std::vector<std::size_t> strongest_first() const {
@@ -202,52 +327,48 @@ class Sources {
 
   /// The best place for a robot's source, with all others where they are.
   void choose(std::size_t robot) {
+    const Fit fit = fit_without(robot);
+    double most = fit.gain() + kLeastSource * kLeastSource * pixels_ * own_overlap();
     chosen_[robot] = nullptr;
-    double most = gain() + kLeastSource * kLeastSource * pixels_ * Overlaps::get().at(0);
-    const Place* best = nullptr;
     for (const Place& place : places_[robot]) {
       if (place.matched.isZero()) continue;
-      chosen_[robot] = &place;
-      const double with = gain();
+      const double with = fit.gain_with(place);
       if (!(with > most)) continue;  // nor where it is no number
       most = with;
-      best = &place;
+      chosen_[robot] = &place;
     }
-    chosen_[robot] = best;
   }
 
   /// The best places for the own source and another one that is close.
   void choose_together(std::size_t other) {
     const Place *own = chosen_[0], *its = chosen_[other];
     if (own == nullptr || its == nullptr || apart(*own, *its) > kClose) return;
-    double most = gain();
-    const Place *best_own = own, *best_its = its;
-    for (const Place& a : places_[0]) {
-      if (apart(a, *own) > kClose) continue;
-      chosen_[0] = &a;
-      for (const Place& b : places_[other]) {
-        if (apart(b, *its) > kClose) continue;
-        chosen_[other] = &b;
-        const double with = gain();
+    const Fit fit = fit_without(0, other);
+    const auto rests = [&](std::size_t robot, const Place& around) {
+      std::vector<Fit::Rest> found;
+      for (const Place& place : places_[robot]) {
+        if (apart(place, around) <= kClose) found.push_back(fit.rest_of(place));
+      }
+      return found;
+    };
+    double most = fit.gain_with(fit.rest_of(*own), fit.rest_of(*its));
+    const std::vector<Fit::Rest> its_rests = rests(other, *its);
+    for (const Fit::Rest& a : rests(0, *own)) {
+      for (const Fit::Rest& b : its_rests) {
+        const double with = fit.gain_with(a, b);
         if (!(with > most)) continue;  // nor where it is no number
         most = with;
-        best_own = &a;
-        best_its = &b;
+        chosen_[0] = a.place;
+        chosen_[other] = b.place;
       }
     }
-    chosen_[0] = best_own;
-    chosen_[other] = best_its;
   }
 
   /// The vertex of a parabola through the gains of the own place and those beside it.
   [[nodiscard]] double refined_bearing() const {
-    Sources trial = *this;
+    const Fit others = fit_without(0);
     const auto at = static_cast<std::size_t>(chosen_[0] - places_[0].data());
-    const auto gain_of = [&](std::size_t i) {
-      trial.chosen_ = chosen_;
-      trial.chosen_[0] = &places_[0][i % places_[0].size()];
-      return trial.gain();
-    };
+    const auto gain_of = [&](std::size_t i) { return others.gain_with(places_[0][i % places_[0].size()]); };
     const double before = gain_of(at + places_[0].size() - 1), here = gain_of(at), after = gain_of(at + 1);
     const double bend = before - 2 * here + after;
     const double shift = bend < 0 ? std::clamp(0.5 * (before - after) / bend, -0.5, 0.5) : 0;

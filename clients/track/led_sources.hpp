@@ -24,7 +24,7 @@ struct LedSource {
 };
 
 /// The source of `disc` itself; nothing if its LED is dark. `light`: around `disc`, of kSourcesReach.
-/// `near`: the robots within kSharedLight.
+/// `near`: the robots within kSharedLight; the first eleven count.
 [[nodiscard]] std::optional<LedSource> own_source(const Light& light, const Circle& disc,
                                                   const std::vector<Circle>& near);
 

@@ -165,8 +165,8 @@ TEST(Headings, StayBoundedWherePositionsJump) {
   }
 }
 
-/// Only seen headings can speak for the hypothesis of a robot that turns in place. Without them it has no weight, and its place is
-/// that of an hour before. It must begin anew where the robot is.
+/// Only seen headings can speak for the hypothesis of a robot that turns in place. Without them it has no weight. As soon as the LED
+/// is seen again, the hypothesis must begin anew where the robot is.
 TEST(Headings, OfARobotThatTurnsInPlaceAreSeenAfterAnHourInTheDark) {
   constexpr double kStep_s = 0.1, kLit_s = 20, kDark_s = 3600;
   std::mt19937_64 random(4);

@@ -137,23 +137,40 @@ TEST(DarkRobots, ThatTurnInPlaceKeepTheirHeadings) {
   }
 }
 
+/// Looks down on the middle of an empty floor: noise of 3 grey levels, uneven light, a lens that is a bit out of focus.
+cameras::Renderer camera_above(double width_mm, double height_mm, double px_per_mm) {
+  proto::Experiment experiment;
+  experiment.mutable_arena()->set_width_mm(width_mm);
+  experiment.mutable_arena()->set_height_mm(height_mm);
+  cameras::CameraModel camera =
+      cameras::CameraModel::overhead(cvRound(width_mm * px_per_mm), cvRound(height_mm * px_per_mm), px_per_mm);
+  camera.read_noise = 3;
+  camera.uneven_light = 0.2;
+  camera.blur_px = 0.7;
+  return {World(experiment), camera};
+}
+
+/// For each robot, whether its LED is read as what it is.
+std::vector<bool> leds_that_are_right(const cv::Mat& picture, const std::vector<Circle>& discs,
+                                      const cameras::Scene& scene) {
+  std::vector<bool> right;
+  for (std::size_t i = 0; i < discs.size(); ++i) {
+    std::vector<Circle> others = discs;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+    right.push_back(bits_of(read_led(picture, discs[i], others).led) == scene.robots[i].led);
+  }
+  return right;
+}
+
 // A third of the LEDs are dark beside lit ones of neighbours that they touch: the neighbours' glow is not theirs.
 TEST(Crowd, RobotsThatTouchKeepTheirColours) {
   constexpr double kPitch_mm = 33.3, kSide_mm = 400;
   constexpr std::uint32_t kRobots = 64, kColumns = 8;
-  proto::Experiment experiment;
-  experiment.mutable_arena()->set_width_mm(kSide_mm);
-  experiment.mutable_arena()->set_height_mm(kSide_mm);
   std::mt19937 random(5);
   std::uniform_real_distribution<double> heading(-kPi, kPi);
   constexpr std::array<std::uint8_t, 5> kColours{0, 3, 3 << 2, 3 << 4, 0};
   for (const double px_per_mm : {0.85, 1.3, 2.0}) {
-    const int side_px = cvRound(kSide_mm * px_per_mm);
-    cameras::CameraModel camera = cameras::CameraModel::overhead(side_px, side_px, px_per_mm);
-    camera.read_noise = 3;
-    camera.uneven_light = 0.2;
-    camera.blur_px = 0.7;
-    cameras::Renderer renderer(World(experiment), camera);
+    cameras::Renderer renderer = camera_above(kSide_mm, kSide_mm, px_per_mm);
     int all = 0, right = 0;
     for (std::uint64_t frame = 0; frame < 6; ++frame) {
       cameras::Scene scene;
@@ -164,12 +181,9 @@ TEST(Crowd, RobotsThatTouchKeepTheirColours) {
         const cv::Point2d centre = renderer.centre_px(pose);
         discs.push_back({{centre.x, centre.y}, 16.5 * px_per_mm});
       }
-      const cv::Mat picture = renderer.render(scene, frame);
-      for (std::size_t i = 0; i < discs.size(); ++i) {
-        std::vector<Circle> others = discs;
-        others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+      for (const bool is_right : leds_that_are_right(renderer.render(scene, frame), discs, scene)) {
         ++all;
-        right += bits_of(read_led(picture, discs[i], others).led) == scene.robots[i].led ? 1 : 0;
+        right += is_right ? 1 : 0;
       }
     }
     std::printf("64 robots that touch, %.2f px/mm: LED %.2f %%\n", px_per_mm, 100.0 * right / all);
@@ -182,18 +196,10 @@ TEST(Crowd, RobotsThatTouchKeepTheirColours) {
 TEST(Crowd, PairsThatTouchWithTheirLedsKeepTheirColours) {
   constexpr double kSide_mm = 920, kPitch_mm = 110, kApart_mm = 33.1;
   const double led_rad = std::atan2(cameras::kLedLeft_mm, cameras::kLedForward_mm);
-  proto::Experiment experiment;
-  experiment.mutable_arena()->set_width_mm(kSide_mm);
-  experiment.mutable_arena()->set_height_mm(kSide_mm);
   std::mt19937 random(3);
   std::uniform_real_distribution<double> direction(-kPi, kPi), off(-0.6, 0.6);
   for (const double px_per_mm : {0.82, 1.3, 2.0}) {
-    const int side_px = cvRound(kSide_mm * px_per_mm);
-    cameras::CameraModel camera = cameras::CameraModel::overhead(side_px, side_px, px_per_mm);
-    camera.read_noise = 3;
-    camera.uneven_light = 0.2;
-    camera.blur_px = 0.7;
-    cameras::Renderer renderer(World(experiment), camera);
+    cameras::Renderer renderer = camera_above(kSide_mm, kSide_mm, px_per_mm);
     int all = 0, right = 0, colours = 0, colours_right = 0;
     for (std::uint64_t frame = 0; frame < 6; ++frame) {
       cameras::Scene scene;
@@ -218,15 +224,13 @@ TEST(Crowd, PairsThatTouchWithTheirLedsKeepTheirColours) {
         cv::imencode(".jpg", picture, octets, {cv::IMWRITE_JPEG_QUALITY, 90});
         picture = cv::imdecode(octets, cv::IMREAD_COLOR);
       }
+      const std::vector<bool> is_right = leds_that_are_right(picture, discs, scene);
       for (std::size_t i = 0; i < discs.size(); ++i) {
-        std::vector<Circle> others = discs;
-        others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
-        const bool is_right = bits_of(read_led(picture, discs[i], others).led) == scene.robots[i].led;
         ++all;
-        right += is_right ? 1 : 0;
+        right += is_right[i] ? 1 : 0;
         if (scene.robots[i].led == bits_of(Led::kWhite)) continue;
         ++colours;
-        colours_right += is_right ? 1 : 0;
+        colours_right += is_right[i] ? 1 : 0;
       }
     }
     std::printf("pairs whose LEDs stand opposite, %.2f px/mm: LED %.2f %%, without white ones %.2f %%\n", px_per_mm,
@@ -244,15 +248,7 @@ TEST_P(TightGrid, HasNoRobotsInItsGaps) {
   const auto [pitch_mm, px_per_mm] = GetParam();
   constexpr double kWidth_mm = 700, kHeight_mm = 500;
   constexpr std::uint32_t kRobots = 12, kColumns = 4;
-  proto::Experiment experiment;
-  experiment.mutable_arena()->set_width_mm(kWidth_mm);
-  experiment.mutable_arena()->set_height_mm(kHeight_mm);
-  cameras::CameraModel camera =
-      cameras::CameraModel::overhead(cvRound(kWidth_mm * px_per_mm), cvRound(kHeight_mm * px_per_mm), px_per_mm);
-  camera.read_noise = 3;
-  camera.uneven_light = 0.2;
-  camera.blur_px = 0.7;
-  cameras::Renderer renderer(World(experiment), camera);
+  cameras::Renderer renderer = camera_above(kWidth_mm, kHeight_mm, px_per_mm);
   cameras::Scene scene;
   for (std::uint32_t i = 0; i < kRobots; ++i) {
     cameras::RobotView& view = scene.robots.emplace_back();

@@ -103,11 +103,10 @@ TEST(Notice, ClocksRunFromPowerOn) {
   for (std::uint32_t i = 0; i < 20; ++i) EXPECT_EQ(TickTimers(fresh).next_clock(i), 255);
 }
 
-/// Real receivers' largest distance estimates in a static group are 110..113 mm (data/radio-log): farther robots are not
-/// received. Beyond their tables, estimates continue with the slope of the last step.
 struct Estimates {
   double mean_mm, spread_mm;
 };
+/// At the edge of the range. Beyond receivers' tables, estimates continue with the slope of the last step.
 Estimates largest_estimates(const std::string& range) {
   constexpr std::uint32_t kListeners = 1000;
   const RunPlan plan =
@@ -133,6 +132,8 @@ Estimates largest_estimates(const std::string& range) {
   return {mean_mm, std::sqrt(squares / kListeners - mean_mm * mean_mm)};
 }
 
+/// Real receivers' largest distance estimates in a static group are 110..113 mm (data/radio-log): farther robots are not
+/// received.
 TEST(CutOff, IsCloseToThatOfRealReceivers) {
   const Estimates by_default = largest_estimates("");
   EXPECT_NEAR(by_default.mean_mm, 112, 5);
