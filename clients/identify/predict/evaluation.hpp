@@ -11,7 +11,7 @@
 
 namespace kilotwin::identify {
 
-/// What took no part in the fit. kNoTime: something did, but was not measured at any predicted time.
+/// What took no part in the fit. kNoTime: something did, but was not measured near any predicted time.
 enum class HeldOut : std::uint8_t { kTestSet, kRuns, kRobots, kNothing, kNoTime };
 /// Whether held-out data give an error.
 [[nodiscard]] constexpr bool gives_errors(HeldOut h) { return h != HeldOut::kNothing && h != HeldOut::kNoTime; }
