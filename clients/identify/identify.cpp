@@ -83,6 +83,7 @@ void add_horizon(identification::Identification& out, const Findings& f, const E
     white.noise = f.white;
     const PredictionErrors was = errors(f.base.model, f.before.tracks),
                            is = errors(f.found.fit.model, f.after.tracks);
+    if (was.rows == 0 || is.rows == 0) continue;  // no sample within a tenth of this horizon
     curve.add_at_s(ahead_s);
     curve.add_before_mm(was.rmse_mm());
     curve.add_after_mm(is.rmse_mm());
@@ -189,7 +190,7 @@ void choose_and_judge(Findings& f, const Fitter& fitter, const MeasuredSet& trai
     f.rmse_without_mm.push_back(evaluation.judge(without_term(fitter, f.found.fit, t), reported).errors.rmse_mm());
 }
 
-/// The held-out tracks that give the error: those that do not choose, or all if none of them is measured at a predicted time.
+/// The held-out tracks that give the error: those that do not choose, or all if none of them is measured near a predicted time.
 Tracks reporting_tracks(const MeasuredSet& train, const MeasuredSet* test, const FitState& base,
                         const ForecastTimes& times, std::uint32_t threads) {
   if (test != nullptr) return Tracks::kAll;

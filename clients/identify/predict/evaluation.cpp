@@ -49,7 +49,7 @@ std::string in_words(HeldOut held_out) {
     case HeldOut::kRuns: return "Errors refer to tracks of the last runs, which took no part in the fit.";
     case HeldOut::kRobots: return "Errors refer to robots that took no part in the fit.";
     case HeldOut::kNoTime:
-      return "No held-out track was measured both at a predicted time (10, 15, 20... s) and before, so the "
+      return "No held-out track was measured both near a predicted time (10, 15, 20... s) and before, so the "
              "prediction "
              "error is unknown, and no effect is confirmed. Give longer runs, sampled once per second or more "
              "often.";

@@ -11,7 +11,7 @@
 
 namespace kilotwin::identify {
 
-/// The data that took no part in the fit. kNoTime: there are such data, but none was measured at any predicted time.
+/// The data that took no part in the fit. kNoTime: there are such data, but none was measured near any predicted time.
 enum class HeldOut : std::uint8_t { kTestSet, kRuns, kRobots, kNothing, kNoTime };
 /// Whether held-out data give an error.
 [[nodiscard]] constexpr bool gives_errors(HeldOut h) { return h != HeldOut::kNothing && h != HeldOut::kNoTime; }

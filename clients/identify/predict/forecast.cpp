@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <deque>
+#include <iterator>
+#include <limits>
 #include <optional>
 
 #include "clients/identify/fit/filter_bank.hpp"
@@ -49,8 +51,10 @@ class Edges {
 /// Forecasts of the robots of one run, from an instant on by their commands alone.
 class JointForecast {
  public:
+  /// `sample_s`: of a track, the instant of a sample, at which its position is predicted, too.
+  template <class SampleTime>
   JointForecast(const MotionModel& model, std::vector<FilterBank>& banks, const TrafficGrids& grids, double from_s,
-                bool neighbours)
+                bool neighbours, const SampleTime& sample_s)
       : model_(model),
         neighbours_(neighbours),
         now_s_(from_s),
@@ -68,6 +72,7 @@ class JointForecast {
         robot.weights.push_back(std::exp(h.log_weight) / sum);
       }
       robot.now_s = bank.last_s();
+      robot.sample_s = sample_s(bank.view());
       RolloutStart& start = robot.start;
       start.view = robot.view;
       start.weights = robot.weights;
@@ -108,11 +113,54 @@ class JointForecast {
   bool expected(std::size_t place, Forecast& out) const {
     const Robot& robot = robots_[place];
     if (robot.filters.empty()) return false;
+    expect_end(robot, out);
+    set_sample(robot, out);
+    return true;
+  }
+
+ private:
+  struct Robot {
+    const TrackView* view = nullptr;
+    std::vector<TrackFilter> filters;
+    std::vector<double> weights;
+    double now_s = 0;
+    NeighbourView near;
+    RolloutStart start;
+    bool needs_rollout = false;  ///< the mean of the futures is not the future of the mean
+    std::optional<RolloutMoments> moments;
+    double sample_s = std::numeric_limits<double>::quiet_NaN();
+    std::optional<Eigen::Vector2d> at_sample_mm;  ///< mean path, before the end
+  };
+  /// The mean path at a time within a step, with the robot's present view of its neighbours.
+  static Eigen::Vector2d path_at(const Robot& robot, double time_s) {
+    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+    for (std::size_t i = 0; i < robot.filters.size(); ++i) {
+      TrackFilter ahead = robot.filters[i];
+      sub_steps(*robot.view->clock, robot.now_s, time_s, [&](double t, double h, const CommandState& commands) {
+        ahead.step_mean(t, h, commands, robot.near);
+      });
+      mean += robot.weights[i] * ahead.expected(time_s, robot.view->clock->at(time_s - 1e-9)).head<2>();
+    }
+    return mean;
+  }
+  /// The prediction at the sample: that at the end, shifted along the mean path.
+  void set_sample(const Robot& robot, Forecast& out) const {
+    constexpr double kSame_s = 0.01;
+    out.sample_s = robot.sample_s;
+    out.sample_x_mm = out.x_mm;
+    out.sample_y_mm = out.y_mm;
+    if (std::isnan(robot.sample_s) || std::abs(robot.sample_s - now_s_) <= kSame_s) return;
+    const Eigen::Vector2d shift_mm =
+        (robot.at_sample_mm ? *robot.at_sample_mm : path_at(robot, robot.sample_s)) - path_at(robot, robot.now_s);
+    out.sample_x_mm += shift_mm[0];
+    out.sample_y_mm += shift_mm[1];
+  }
+  void expect_end(const Robot& robot, Forecast& out) const {
     if (robot.moments) {
       out.x_mm = robot.moments->x_mm;
       out.y_mm = robot.moments->y_mm;
       out.expected_error_mm = std::sqrt(robot.moments->square_mm2 + 2 * model_.noise.position_mm2);
-      return true;
+      return;
     }
     const CommandState commands = robot.view->clock->at(now_s_ - 1e-9);
     double x = 0, y = 0, square = 0, spread = 0;
@@ -127,20 +175,7 @@ class JointForecast {
     out.y_mm = y;
     out.expected_error_mm =
         std::sqrt(spread + std::max(0.0, square - x * x - y * y) + 2 * model_.noise.position_mm2);
-    return true;
   }
-
- private:
-  struct Robot {
-    const TrackView* view = nullptr;
-    std::vector<TrackFilter> filters;
-    std::vector<double> weights;
-    double now_s = 0;
-    NeighbourView near;
-    RolloutStart start;
-    bool needs_rollout = false;  ///< the mean of the futures is not the future of the mean
-    std::optional<RolloutMoments> moments;
-  };
   /// Updates neighbour views and traffic, for the next `for_s`.
   void see(double for_s) {
     if (!neighbours_) return;
@@ -178,6 +213,8 @@ class JointForecast {
   }
   void advance(double to_s) {
     for (Robot& robot : robots_) {
+      if (!robot.filters.empty() && robot.now_s < robot.sample_s && robot.sample_s <= to_s)
+        robot.at_sample_mm = path_at(robot, robot.sample_s);
       for (TrackFilter& filter : robot.filters)
         sub_steps(*robot.view->clock, robot.now_s, to_s, [&](double t, double h, const CommandState& commands) {
           filter.step_mean(t, h, commands, robot.near);
@@ -273,12 +310,23 @@ bool looks_at_neighbours(const MotionModel& model) {
 
 }  // namespace
 
-bool measured_at(const Track& track, double time_s, Sample& out) {
-  const auto at = std::lower_bound(track.samples.begin(), track.samples.end(), time_s - 0.01,
-                                   [](const Sample& s, double t) { return s.time_s < t; });
-  if (at == track.samples.end() || at->time_s > time_s + 0.01) return false;
-  out = *at;
-  return true;
+const Sample* sample_near(const Track& track, double time_s, double reach_s) {
+  const auto after = std::lower_bound(track.samples.begin(), track.samples.end(), time_s,
+                                      [](const Sample& s, double t) { return s.time_s < t; });
+  const Sample* nearest = after == track.samples.end() ? nullptr : &*after;
+  if (after != track.samples.begin()) {
+    const Sample* const before = &*std::prev(after);
+    if (nearest == nullptr || time_s - before->time_s <= nearest->time_s - time_s) nearest = before;
+  }
+  return nearest != nullptr && std::abs(nearest->time_s - time_s) <= reach_s ? nearest : nullptr;
+}
+
+std::optional<Eigen::Vector2d> error_of(const Track& track, const Forecast& f) {
+  constexpr double kSame_s = 1e-9;
+  if (std::isnan(f.sample_s)) return std::nullopt;
+  const Sample* const seen = sample_near(track, f.sample_s, kSame_s);
+  if (seen == nullptr) return std::nullopt;
+  return Eigen::Vector2d(seen->x_mm - f.sample_x_mm, seen->y_mm - f.sample_y_mm);
 }
 
 namespace {
@@ -303,7 +351,11 @@ struct RunForecast {
   std::vector<Forecast> at(double from_s, double time_s, std::uint32_t rollouts, bool all,
                            std::array<std::uint32_t, 2> key) {
     const TrafficGrids grids = traffic.at(from_s, banks);
-    JointForecast joint(model, banks, grids, from_s, neighbours);
+    const auto sample_s = [&](const TrackView& view) {
+      const Sample* const near = sample_near(*view.track, time_s, kNear * (time_s - from_s));
+      return near != nullptr ? near->time_s : std::numeric_limits<double>::quiet_NaN();
+    };
+    JointForecast joint(model, banks, grids, from_s, neighbours, sample_s);
     joint.advance_to(time_s);
     if (rollouts > 0 && (model.contacts || grids.any() || Edges(model).any()))
       joint.draw_rollouts(from_s, rollouts, all, key);
@@ -381,7 +433,8 @@ std::vector<Forecast> forecast(const MotionModel& model, const PreparedSet& set,
       if (between.high != between.low) {
         const std::vector<Forecast> high = forecast_by(between.high);
         for (std::size_t i = 0; i < seen.size(); ++i) {
-          for (double Forecast::*const number : {&Forecast::x_mm, &Forecast::y_mm, &Forecast::expected_error_mm})
+          for (double Forecast::*const number : {&Forecast::x_mm, &Forecast::y_mm, &Forecast::expected_error_mm,
+                                                 &Forecast::sample_x_mm, &Forecast::sample_y_mm})
             seen[i].*number += between.part * (high[i].*number - seen[i].*number);
         }
       }

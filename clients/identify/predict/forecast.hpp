@@ -1,6 +1,9 @@
 /// Forecasts: positions of robots one horizon ahead, given the measurements of a run up to an instant.
 #pragma once
 
+#include <Eigen/Core>
+#include <limits>
+#include <optional>
 #include <vector>
 
 #include "clients/identify/fit/fitter.hpp"
@@ -15,7 +18,12 @@ struct Forecast {
   double expected_error_mm;  ///< root mean square distance to the measurement that the filter itself expects
   /// Disc centre and heading at the start of the horizon, as estimated by the filter.
   double from_x_mm = 0, from_y_mm = 0, from_heading_rad = 0;
+  /// The instant of the sample nearest to time_s, at most kNear of the horizon away, and the position predicted for it.
+  /// NaN: there is no such sample.
+  double sample_s = std::numeric_limits<double>::quiet_NaN(), sample_x_mm = 0, sample_y_mm = 0;
 };
+/// Trackers need not sample at the predicted times: their frames may jitter, be shifted or be lost.
+inline constexpr double kNear = 0.1;
 
 struct ForecastTimes {
   double first_s = 10, every_s = 5, horizon_s = 10;
@@ -32,7 +40,10 @@ struct ForecastTimes {
 [[nodiscard]] std::vector<Forecast> free_ones(const MotionModel&, const PreparedSet&, const std::vector<Forecast>&,
                                               double horizon_s);
 
-/// The sample within 0.01 s of a time; false if there is none.
-[[nodiscard]] bool measured_at(const Track&, double time_s, Sample&);
+/// The sample nearest to a time, at most `reach_s` away; of two equally near ones the earlier. Null: none.
+[[nodiscard]] const Sample* sample_near(const Track&, double time_s, double reach_s);
+
+/// Measured minus predicted position at the sample of a forecast, mm; nothing if it has none.
+[[nodiscard]] std::optional<Eigen::Vector2d> error_of(const Track&, const Forecast&);
 
 }  // namespace kilotwin::identify

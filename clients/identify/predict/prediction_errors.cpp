@@ -60,9 +60,9 @@ double PredictionErrors::expected_mm() const { return root_mean(expected_mm2, ro
 PredictionErrors errors_of(const MeasuredSet& set, const std::vector<Forecast>& predictions) {
   PredictionErrors errors;
   for (const Forecast& p : predictions) {
-    Sample seen;
-    if (!measured_at(set.runs[p.run].tracks[p.place], p.time_s, seen)) continue;
-    const double dx = seen.x_mm - p.x_mm, dy = seen.y_mm - p.y_mm, square = dx * dx + dy * dy;
+    const std::optional<Eigen::Vector2d> error_mm = error_of(set.runs[p.run].tracks[p.place], p);
+    if (!error_mm) continue;
+    const double square = error_mm->squaredNorm();
     auto& track = errors.by_track[{p.run, p.place}];
     track.sum_mm2 += square;
     track.rows += 1;
@@ -111,6 +111,25 @@ std::optional<ErrorBounds> bounds_of(const MeasuredSet& set, const PredictionErr
   return ErrorBounds{middle_95(was), middle_95(is), middle_95(less), robot_place.size(), run_place.size()};
 }
 
+std::optional<StretchBounds> bounds_of(const std::vector<Stretch>& stretches) {
+  constexpr std::size_t kFewest = 12;
+  if (stretches.size() < kFewest) return std::nullopt;
+  const Random random(20180729);
+  std::vector<double> error, less;
+  for (std::int64_t k = 0; k < kDraws; ++k) {
+    const std::vector<double> times = drawn(random, stretches.size(), k, 2);
+    Stretch sum;
+    for (std::size_t i = 0; i < stretches.size(); ++i) {
+      sum.before_mm2 += times[i] * stretches[i].before_mm2;
+      sum.after_mm2 += times[i] * stretches[i].after_mm2;
+      sum.rows += times[i] * stretches[i].rows;
+    }
+    error.push_back(std::sqrt(sum.before_mm2 / sum.rows));
+    less.push_back(error.back() - std::sqrt(sum.after_mm2 / sum.rows));
+  }
+  return StretchBounds{middle_95(error), middle_95(less)};
+}
+
 std::optional<Replicates> replicates_of(
     const std::vector<std::pair<const MeasuredSet*, const std::vector<Forecast>*>>& sets, double horizon_s) {
   constexpr std::size_t kFewest = 30;
@@ -119,12 +138,13 @@ std::optional<Replicates> replicates_of(
   for (const auto& [set, predictions] : sets) {
     for (const Forecast& p : *predictions) {
       const Track& track = set->runs[p.run].tracks[p.place];
-      Sample end, start;
-      if (!measured_at(track, p.time_s, end) || !measured_at(track, p.time_s - horizon_s, start)) continue;
+      const std::optional<Eigen::Vector2d> error_mm = error_of(track, p);
+      const Sample* const start = sample_near(track, p.time_s - horizon_s, kNear * horizon_s);
+      if (!error_mm || start == nullptr) continue;
       // A rough heading suffices: it rotates the error, not the path.
-      const double heading =
-          std::isnan(start.heading_rad) ? std::atan2(p.y_mm - start.y_mm, p.x_mm - start.x_mm) : start.heading_rad;
-      const double dx = end.x_mm - p.x_mm, dy = end.y_mm - p.y_mm, c = std::cos(heading), s = std::sin(heading);
+      const double heading = std::isnan(start->heading_rad) ? std::atan2(p.y_mm - start->y_mm, p.x_mm - start->x_mm)
+                                                            : start->heading_rad;
+      const double dx = error_mm->x(), dy = error_mm->y(), c = std::cos(heading), s = std::sin(heading);
       at[{track.robot, std::llround(p.time_s * 1000)}].push_back({&track, dx * c + dy * s, dy * c - dx * s});
     }
   }

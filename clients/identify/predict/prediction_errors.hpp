@@ -43,6 +43,19 @@ struct ErrorBounds {
 [[nodiscard]] std::optional<ErrorBounds> bounds_of(const MeasuredSet&, const PredictionErrors& before,
                                                    const PredictionErrors& after);
 
+/// Sums over successive predictions of one track.
+struct Stretch {
+  double before_mm2 = 0, after_mm2 = 0, rows = 0;
+};
+
+/// 95 % intervals for the same robots at other times.
+struct StretchBounds {
+  Interval before, less_by;
+};
+
+/// A bootstrap over stretches, which must be long enough to be independent. Nothing of fewer than 12.
+[[nodiscard]] std::optional<StretchBounds> bounds_of(const std::vector<Stretch>&);
+
 /// The part of the error that differs between repetitions of the same commands.
 struct Replicates {
   double floor_mm = 0;       ///< root mean square within groups: a bound for models of these covariates

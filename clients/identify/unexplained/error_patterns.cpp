@@ -106,8 +106,14 @@ std::vector<Pattern> patterns_of(const std::vector<Window>& known, const std::ve
       if (p.share >= alone[f] + alone[g] + least_share) found.push_back(std::move(p));
     }
   }
+  // A pair repeats what its covariates show alone: it counts by what it adds.
+  const auto adds = [&](const Pattern& p) {
+    if (p.over.size() == 1) return p.share;
+    return p.share -
+           std::max(alone[static_cast<std::size_t>(p.over[0])], alone[static_cast<std::size_t>(p.over[1])]);
+  };
   std::stable_sort(found.begin(), found.end(),
-                   [](const Pattern& a, const Pattern& b) { return a.share > b.share; });
+                   [&](const Pattern& a, const Pattern& b) { return adds(a) > adds(b); });
   return found;
 }
 

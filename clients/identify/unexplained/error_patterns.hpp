@@ -19,8 +19,9 @@ struct Pattern {
   double share = 0;  ///< of the mean square error of other windows that these means predict
 };
 
-/// Patterns of `known` that predict at least `least_share` of the mean square error of `held_out`; the largest share
-/// first. A pair is listed only if it predicts more than its covariates do one by one, by the same share.
+/// Patterns of `known` that predict at least `least_share` of the mean square error of `held_out`. A pair is listed only if
+/// it predicts more than its covariates do one by one, by the same share. The largest share first; of a pair counts what it
+/// adds to its better covariate.
 [[nodiscard]] std::vector<Pattern> patterns_of(const std::vector<Window>& known,
                                                const std::vector<Window>& held_out, double least_share);
 

@@ -8,20 +8,21 @@ namespace kilotwin::identify {
 namespace {
 
 struct Description {
-  const char *name, *unit;
+  const char *name, *unit, *words;
 };
-constexpr std::array<Description, kFeatures> kDescriptions = {{{"time", "s"},
-                                                               {"driven_time", "s"},
-                                                               {"x", "mm"},
-                                                               {"y", "mm"},
-                                                               {"heading", "rad"},
-                                                               {"command", ""},
-                                                               {"straight", "share"},
-                                                               {"turning", "share"},
-                                                               {"time_since_command", "s"},
-                                                               {"nearest", "mm"},
-                                                               {"bearing", "rad"},
-                                                               {"robot", ""}}};
+constexpr std::array<Description, kFeatures> kDescriptions = {
+    {{"time", "s", "time"},
+     {"driven_time", "s", "driven time"},
+     {"x", "mm", "x"},
+     {"y", "mm", "y"},
+     {"heading", "rad", "heading"},
+     {"command", "", "command"},
+     {"straight", "share", "command: share of straight driving"},
+     {"turning", "share", "command: share of left minus right turns"},
+     {"time_since_command", "s", "time since command"},
+     {"nearest", "mm", "distance to the nearest robot"},
+     {"bearing", "rad", "direction to the nearest robot"},
+     {"robot", "", "robot"}}};
 
 /// Share of a time interval under each command.
 std::array<double, 4> shares_of(const CommandClock& clock, double from_s, double to_s) {
@@ -39,14 +40,16 @@ std::array<double, 4> shares_of(const CommandClock& clock, double from_s, double
 const char* name_of(Feature feature) { return kDescriptions[static_cast<std::size_t>(feature)].name; }
 const char* unit_of(Feature feature) { return kDescriptions[static_cast<std::size_t>(feature)].unit; }
 
+const char* in_words(Feature feature) { return kDescriptions[static_cast<std::size_t>(feature)].words; }
+
 std::vector<Window> windows_of(const PreparedSet& set, const std::vector<Forecast>& forecasts, double horizon_s) {
   std::map<std::pair<std::uint32_t, std::size_t>, const TrackView*> views;
   for (const TrackView& view : set.views()) views[{view.run, view.place}] = &view;
   std::vector<Window> windows;
   for (const Forecast& f : forecasts) {
     const TrackView& view = *views.at({f.run, f.place});
-    Sample end;
-    if (!measured_at(*view.track, f.time_s, end)) continue;
+    const std::optional<Eigen::Vector2d> error_mm = error_of(*view.track, f);
+    if (!error_mm) continue;
     const double from_s = f.time_s - horizon_s;
     const CommandState state = view.clock->at(from_s);
     const std::array<double, 4> shares = shares_of(*view.clock, from_s, f.time_s);
@@ -69,9 +72,9 @@ std::vector<Window> windows_of(const PreparedSet& set, const std::vector<Forecas
     set_at(Feature::kBearing,
            near.nearest_mm < kFarNeighbour_mm ? wrapped_angle(near.direction_rad - f.from_heading_rad) : 0);
     set_at(Feature::kRobot, view.track->robot);
-    const double dx = end.x_mm - f.x_mm, dy = end.y_mm - f.y_mm, c = std::cos(f.from_heading_rad),
+    const double dx = error_mm->x(), dy = error_mm->y(), c = std::cos(f.from_heading_rad),
                  s = std::sin(f.from_heading_rad);
-    w.in_world_mm = {dx, dy};
+    w.in_world_mm = *error_mm;
     w.in_body_mm = {dx * c + dy * s, dy * c - dx * s};
     windows.push_back(w);
   }

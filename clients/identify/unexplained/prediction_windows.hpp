@@ -29,9 +29,10 @@ enum class Feature : std::uint8_t {
 inline constexpr std::size_t kFeatures = 12;
 inline constexpr double kFarNeighbour_mm = 200;
 
-/// Name as in result.json, and unit.
+/// Name as in result.json, unit, and name for people.
 [[nodiscard]] const char* name_of(Feature);
 [[nodiscard]] const char* unit_of(Feature);
+[[nodiscard]] const char* in_words(Feature);
 
 struct Window {
   std::uint32_t run = 0, place = 0;  ///< of the track, as in Forecast

@@ -10,18 +10,9 @@
 
 #include "clients/identify/predict/prediction_errors.hpp"
 #include "clients/identify/unexplained/error_patterns.hpp"
+#include "clients/identify/unexplained/learner_check.hpp"
 
 namespace kilotwin::identify {
-
-/// The learner: trained on windows of the fit, judged on held-out windows. Without those it is cross-validated by track.
-struct LearnerCheck {
-  double error_mm = 0;        ///< of the model, on the same windows
-  double error_left_mm = 0;   ///< after the learner's prediction is subtracted
-  Interval less_by_mm{0, 0};  ///< 95 % interval of the difference
-  bool cross_validated = false;
-  /// Root mean square of what the learner predicts; 0 if that is within chance.
-  [[nodiscard]] double predicted_mm() const;
-};
 
 struct Unexplained {
   double error_mm = 0;                   ///< of the model on held-out data; 0: nothing is held out
