@@ -28,6 +28,9 @@ constexpr std::int64_t kProbePeriod = 37;
 /// A program whose loop() settles in none of that many calls of a tick is slow to simulate.
 constexpr std::int64_t kManyCalls = 64;
 
+/// Draws of Stream::kProgram per robot and tick.
+constexpr std::uint32_t kNoiseSeed = 0, kInterruptedCycle = 1;
+
 constexpr std::uint16_t kInitialTxPeriod = 3906;  // kilolib: half a second in counts of 128 us
 
 }  // namespace
@@ -38,6 +41,8 @@ struct BehavioursEngine::Span {
   const Slot& slot;
   bool eventful;      ///< callbacks have run in this tick
   bool kept = false;  ///< memory_ holds what the slot holds, besides KtRobot
+  /// Cycles of a call of loop() that changes nothing and was skipped for the rest of the tick; 0: no call was skipped.
+  std::int32_t call_cycles = 0;
 };
 
 BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared_ptr<ProgramSet> programs)
@@ -357,7 +362,7 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
     const KtMessage* message = nullptr;
     std::int32_t cycles = 0;
     span.kept = false;
-    const Fault* const fault = executor.transmit(message, cycles);
+    const Fault* const fault = transmit(i, executor, span, message, cycles);
     if (fault != nullptr) return fail_robot(i, *fault, program, slot);
     if (robot.loop_rate == KT_LOOP_AS_ON_ROBOT) robot.debt_cycles += static_cast<std::uint64_t>(cycles);
     if (message != nullptr) {
@@ -472,7 +477,10 @@ Executor::Main BehavioursEngine::run_loops(std::uint32_t i, const Executor& exec
     if (robot.spent == 0 && exchange.log_length == printed &&
         memory.settles(span.program, span.slot, executor.data_octets(), thread)) {
       span.kept = true;
-      if (calls == 1 || used <= 0 || cycles <= 0) return main;
+      if (calls == 1 || used <= 0 || cycles <= 0) {
+        if (calls == 1 && cycles > 0) span.call_cycles = used;
+        return main;
+      }
       // A period of several calls: only its rest at the end of the tick is still to be executed.
       cycles %= used;
       if (cycles == 0) return main;
@@ -485,6 +493,27 @@ Executor::Main BehavioursEngine::run_loops(std::uint32_t i, const Executor& exec
     if (calls != 0 && calls < 1u << 20 && tried_again) calls *= 2;
     tried_again = true;
   }
+}
+
+/// Calls kilo_message_tx. On a robot this interrupts loop() at any place. A program that is not ready to send for a part of each
+/// call must be found so as often as that part lasts. If the calls were skipped, one is therefore executed up to a random cycle, and
+/// completed after the callback.
+const Fault* BehavioursEngine::transmit(std::uint32_t i, const Executor& executor, const Span& span,
+                                        const KtMessage*& message, std::int32_t& cycles) {
+  if (span.call_cycles <= 0) return executor.transmit(message, cycles);
+  KtRobot& robot = executor.robot();
+  const auto length = static_cast<std::uint64_t>(span.call_cycles);
+  const std::uint64_t bits = random_.bits(Stream::kProgram, share_.first + i, now_, kInterruptedCycle);
+  const auto before = static_cast<std::int32_t>((bits >> 32) * length >> 32);
+  robot.calls = 1;
+  robot.returned = 0;
+  const Executor::Main first = executor.run_main(before, 0);
+  if (first.fault != nullptr) return first.fault;
+  if (const Fault* const fault = executor.transmit(message, cycles)) return fault;
+  if (robot.returned != 0) return nullptr;
+  const Executor::Main rest = executor.run_main(std::max(span.call_cycles - before + first.left, 0), 0);
+  if (rest.preempted) ++robot.waits;
+  return rest.fault;
 }
 
 /// Notes that in this tick loop() was called so often, and that the last call changed something.
@@ -581,7 +610,7 @@ void BehavioursEngine::reset_robot(Tick tick, std::uint32_t i, const Program& pr
   const Calibration& calibration = parameters_.calibration(id);
   memory_[i].reset(program, slot);
   auto robot = memory_[i].get<KtRobot>(program, program.file.table.robot);
-  robot.noise = random_.bits(Stream::kProgram, id, tick, 0);
+  robot.noise = random_.bits(Stream::kProgram, id, tick, kNoiseSeed);
   robot.tick_cycles = plan_.tick_length.cycles();
   robot.loop_rate = plan_.loop_rate(id) == LoopRate::kAsOnRobot ? KT_LOOP_AS_ON_ROBOT : KT_LOOP_PER_TICK;
   robot.uid = plan_.uid_of(id);

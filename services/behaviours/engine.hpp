@@ -146,6 +146,8 @@ class BehavioursEngine {
   [[gnu::always_inline]] inline void note_outputs(std::uint32_t i, KtRobot& robot, const Slot&,
                                                   std::uint16_t tx_period);
   [[gnu::always_inline]] inline void note_motors(std::uint32_t i, KtRobot& robot, KilotwinMotorPhases&);
+  const Fault* transmit(std::uint32_t i, const Executor&, const Span&, const KtMessage*& message,
+                        std::int32_t& cycles);
   [[nodiscard]] bool is_first(std::uint32_t i, Warning);
   void probe_loop(std::uint32_t i, const Program&, const Slot&, const Executor&);
   void note_overflows(std::uint32_t i, KtExchange&, const Program&, const Slot&);

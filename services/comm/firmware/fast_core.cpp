@@ -278,7 +278,8 @@ FastCore::Operation FastCore::decode(std::uint32_t pc) const {
   }
   if ((o & 0xff0f) == 0x9408) {
     const auto flag = static_cast<std::uint8_t>(o >> 4 & 7);
-    if (flag == S_I) return other;
+    // SEI concerns interrupts that wait. While this core runs, none waits: to it CLI is a flag like others.
+    if (flag == S_I && (o & 0x80) == 0) return other;
     return {(o & 0x80) != 0 ? kClearFlag : kSetFlag, flag, 0, 1, 0};
   }
   switch (o) {

@@ -83,6 +83,7 @@ std::uint32_t millivolts(std::int32_t counts, std::uint32_t reference_mV) {
 /// libsimavr has one logger for all processors of the process.
 struct LogHook {
   static void log(avr_t* avr, int level, const char* format, va_list) {
+    if (level > LOG_WARNING) return;  // libsimavr traces every conversion
     if (avr != nullptr && avr->custom.data != nullptr) Mcu::on_log(avr, level, format, nullptr);
   }
 };

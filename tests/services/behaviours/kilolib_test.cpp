@@ -128,6 +128,29 @@ TEST(Kilolib, ReceivedMessagesCarryTheirChecksum) {
   EXPECT_EQ(swarm.led(0), 0x0C);
 }
 
+/// On a robot no push can come between kilo_message_tx and kilo_message_tx_success: interrupts are off meanwhile.
+TEST(Kilolib, APushIntoTheFullRingLosesNoMessageThatWaits) {
+  Swarm swarm({"#define TXBUFFER_SIZE 2\n#include <kilolib.h>\n#include <message_buffered.h>\n"
+               "static void put(uint8_t n) { message_t m = {{n}, NORMAL, 0}; m.crc = message_crc(&m); "
+               "txbuffer_push(&m); }\n"
+               "static void setup(void) { put(1); put(2); }\n"
+               "static void loop(void) { distance_measurement_t d; if (!rxbuffer_peek(&d)) return; rxbuffer_pop(); "
+               "put(3); }\n"
+               "int main(void) { kilo_init(); kilo_message_buffered(); kilo_start(setup, loop); return 0; }\n"},
+              1);
+  swarm.start();
+  EXPECT_EQ(asked(swarm)[0], 1);
+  Air air;
+  air.receptions = {{0, message(0)}};
+  swarm.step(air);  // the program pushes 3, and the ring drops 1, which the radio is sending
+  for (const int next : {2, 3}) {
+    air = Air();
+    air.sent = {0};
+    swarm.step(air);
+    EXPECT_EQ(asked(swarm)[0], next);
+  }
+}
+
 TEST(Kilolib, SoftRandomNumbersAreThoseOfTheFirmware) {
   const IrMessage r = report("for (int i = 0; i < 9; ++i) report[i] = rand_soft();");
   std::uint8_t seed = 0xAA, accumulator = 0;

@@ -67,6 +67,37 @@ TEST(LoopRate, FunctionsOfKilolibTakeTheirTime) {
   EXPECT_NEAR(cycles("v = message_crc(&other);"), 400, 60);
 }
 
+/// The share of requests at which kilo_message_tx finds `busy` set, in 600 requests.
+double busy_share(const std::string& loop) {
+  Robot robot(
+      "static volatile uint8_t busy; static volatile uint16_t v; static message_t m;\n"
+      "static message_t* tx(void) { return busy ? NULL : &m; }\n"
+      "static void loop(void) { " +
+      loop + " }\n");
+  constexpr int kRequests = 600;
+  int offers = 0;
+  Air air;
+  air.ask = {0};
+  for (int k = 0; k < kRequests; ++k) {
+    robot.step(air);
+    const bool offers_now = !robot.frame().offer_robot.empty();
+    offers += offers_now ? 1 : 0;
+    air.sent.clear();
+    if (offers_now) air.sent = {0};
+  }
+  return 1 - offers / double{kRequests};
+}
+
+TEST(LoopRate, AMessageIsAskedForAtAnyPlaceOfACallThatChangesNothing) {
+  // On a robot the callback interrupts loop(): it finds each place as often as the program is there.
+  const std::string wait = "for (uint16_t i = 0; i < 300; ++i) v = 0;";
+  EXPECT_EQ(busy_share(wait), 0);
+  EXPECT_EQ(busy_share("busy = 1; v = 0; busy = 0; " + wait), 0) << "too short to be interrupted";
+  // Five standard deviations of 600 requests are 0.1.
+  EXPECT_NEAR(busy_share("busy = 1; " + wait + " busy = 0; " + wait), 0.5, 0.1);
+  EXPECT_NEAR(busy_share("busy = 1; " + wait + " busy = 0; " + wait + wait + wait), 0.25, 0.1);
+}
+
 TEST(LoopRate, MessagesAreSeenOnceEach) {
   Robot robot(
       "static volatile uint8_t is_new; static uint8_t n;\n"

@@ -43,24 +43,39 @@ void rxbuffer_pop(void) {
 
 uint8_t txbuffer_size(void) { return (uint8_t)RB_size(txbuffer); }
 
+/* Whether the oldest message is the one that kilo_message_tx gave last. Between that and kilo_message_tx_success loop() may push
+ * into the full ring, which drops this message. The next one must then stay. */
+static uint8_t txbuffer_is_sending;
+
 void txbuffer_push(message_t* msg) {
+  if (RB_full(txbuffer)) txbuffer_is_sending = 0;
   RB_back(txbuffer) = *msg;
   RB_pushback(txbuffer);
 }
 
-/* The oldest message that waits to be sent, or NULL. */
+/* The oldest message that waits to be sent, or NULL. It is valid until the next push or pop. */
 message_t* txbuffer_peek(void) { return RB_empty(txbuffer) ? NULL : &RB_front(txbuffer); }
 
 void txbuffer_pop(void) {
   if (!RB_empty(txbuffer)) RB_popfront(txbuffer);
+  txbuffer_is_sending = 0;
+}
+
+static message_t* txbuffer_give(void) {
+  txbuffer_is_sending = 1;
+  return txbuffer_peek();
+}
+
+static void txbuffer_sent(void) {
+  if (txbuffer_is_sending) txbuffer_pop();
 }
 
 static inline void kilo_message_buffered(void) {
   RB_init(rxbuffer);
   RB_init(txbuffer);
   kilo_message_rx = rxbuffer_push;
-  kilo_message_tx = txbuffer_peek;
-  kilo_message_tx_success = txbuffer_pop;
+  kilo_message_tx = txbuffer_give;
+  kilo_message_tx_success = txbuffer_sent;
 }
 
 #endif
