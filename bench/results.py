@@ -33,7 +33,6 @@ class Part(NamedTuple):
     """Whether figures depend on the machine and on its load."""
 
 
-
 def output_of(*command: object, cwd: pathlib.Path = ROOT, may_fail: bool = False) -> str:
     """What a program prints. If it fails, the writer ends without a page; with `may_fail`, status 1 means a figure that misses."""
     done = subprocess.run([str(word) for word in command], cwd=cwd, stdout=subprocess.PIPE, text=True, check=False)
@@ -61,9 +60,12 @@ def summary_of(out: pathlib.Path) -> dict:
 
 
 def mean_and_error(values: list[float]) -> str:
-    """The mean and its standard error."""
+    """The mean and its standard error, both to the second digit of the error."""
     error = statistics.stdev(values) / math.sqrt(len(values)) if len(values) > 1 else 0
-    return f"{number(statistics.fmean(values))} +- {number(error, 2)}"
+    if error == 0:
+        return f"{number(statistics.fmean(values))} +- 0"
+    places = 1 - math.floor(math.log10(error))
+    return " +- ".join(f"{round(value, places):,.{max(places, 0)}f}" for value in (statistics.fmean(values), error))
 
 
 def data_of(arguments: argparse.Namespace, name: str) -> pathlib.Path:

@@ -61,7 +61,8 @@ struct Robot {
 
 struct Tally {
   double robot_s = 0, close_pair_s = 0, missed_s = 0, square_mm = 0, heading_rad = 0;
-  long sightings = 0, headings = 0, losses = 0, swaps = 0, led_wrong = 0, late = 0;
+  long sightings = 0, headings = 0, losses = 0, led_wrong = 0, late = 0;
+  long swaps = 0;              ///< pairs of which one robot is followed by the track that followed the other
   std::vector<double> cpu_ms;  ///< of each picture
 };
 
@@ -75,8 +76,16 @@ class Judge {
         if (distance(truth[i].pose, truth[j].pose.x_mm, truth[j].pose.y_mm) < kSwapDistance_mm)
           tally.close_pair_s += period_s;
       }
-      look(i, truth[i], period_s, tracker);
     }
+    std::vector<std::optional<std::uint32_t>> now(truth.size());
+    for (std::size_t i = 0; i < truth.size(); ++i) now[i] = look(i, truth[i], period_s, tracker);
+    const auto takes = [&](std::size_t i, std::size_t j) {  // i is followed by the track that followed j
+      return now[i] && robots_[i].track && now[i] != robots_[i].track && now[i] == robots_[j].track;
+    };
+    for (std::size_t i = 0; i < truth.size(); ++i)
+      for (std::size_t j = i + 1; j < truth.size(); ++j) tally.swaps += takes(i, j) || takes(j, i) ? 1 : 0;
+    for (std::size_t i = 0; i < truth.size(); ++i)
+      if (now[i]) robots_[i].track = now[i];
   }
   Tally tally;
 
@@ -84,7 +93,9 @@ class Judge {
   static double distance(const Pose& pose, double x_mm, double y_mm) {
     return std::hypot(pose.x_mm - x_mm, pose.y_mm - y_mm);
   }
-  void look(std::size_t i, const Seen& truth, double period_s, const track::PictureTracker& tracker) {
+  /// Compares the nearest track with a robot; returns its number. Nothing: the robot is missed.
+  std::optional<std::uint32_t> look(std::size_t i, const Seen& truth, double period_s,
+                                    const track::PictureTracker& tracker) {
     const track::Track* mine = nullptr;
     double off_mm = kMatch_mm;
     for (const track::Track& track : tracker.follower().tracks()) {
@@ -97,7 +108,7 @@ class Judge {
     tally.missed_s += mine == nullptr ? period_s : 0;
     tally.losses += mine == nullptr && !robot.missed ? 1 : 0;
     robot.missed = mine == nullptr;
-    if (mine == nullptr) return;
+    if (mine == nullptr) return std::nullopt;
     ++tally.sightings;
     tally.square_mm += off_mm * off_mm;
     if (const auto heading = mine->heading_filter.heading()) {
@@ -105,11 +116,7 @@ class Judge {
       ++tally.headings;
     }
     tally.led_wrong += track::bits_of(*mine->led_read) != truth.led ? 1 : 0;
-    const bool was_anothers = std::any_of(robots_.begin(), robots_.end(), [&](const Robot& other) {
-      return &other != &robot && other.track == mine->id;
-    });
-    if (robot.track && *robot.track != mine->id && was_anothers) ++tally.swaps;
-    robot.track = mine->id;
+    return mine->id;
   }
 
   std::vector<Robot> robots_;
@@ -140,13 +147,15 @@ void print(const char* name, Tally t) {
   const auto frames = static_cast<double>(std::max<std::size_t>(1, t.cpu_ms.size()));
   double cpu_ms = 0;
   for (const double one : t.cpu_ms) cpu_ms += one;
-  fmt::print("| {} | {:.2f} | {:.3f} | {:.1f} | {} | {} | {:.2f} | {} | {:.3g} | {:.0f}, {:.0f} | {} |\n", name,
-             t.robot_s / 3600, std::sqrt(t.square_mm / static_cast<double>(2 * std::max(1L, t.sightings))),
-             180 / kPi * t.heading_rad / static_cast<double>(std::max(1L, t.headings)),
-             rate(t.led_wrong, static_cast<double>(t.sightings)), rate(t.losses, t.robot_s / 3600),
-             t.losses == 0 ? 0 : t.missed_s / static_cast<double>(t.losses),
-             rate(t.swaps / 2, t.close_pair_s / 3600), t.close_pair_s / 3600, cpu_ms / frames,
-             t.cpu_ms.empty() ? 0 : t.cpu_ms[t.cpu_ms.size() * 99 / 100], rate(t.late, frames));
+  fmt::print(
+      "| {} | {:.2f} | {:.3f} | {:.1f} | {} | {} | {:.2f} | {} | {:.3g} | {:.0f}, {:.0f} | {} |\n", name,
+      t.robot_s / 3600, std::sqrt(t.square_mm / static_cast<double>(2 * std::max(1L, t.sightings))),
+      180 / kPi * t.heading_rad / static_cast<double>(std::max(1L, t.headings)),
+      // Readings of one robot in successive pictures depend on each other: no interval.
+      fmt::format("{:.2g}", static_cast<double>(t.led_wrong) / static_cast<double>(std::max(1L, t.sightings))),
+      rate(t.losses, t.robot_s / 3600), t.losses == 0 ? 0 : t.missed_s / static_cast<double>(t.losses),
+      rate(t.swaps, t.close_pair_s / 3600), t.close_pair_s / 3600, cpu_ms / frames,
+      t.cpu_ms.empty() ? 0 : t.cpu_ms[t.cpu_ms.size() * 99 / 100], rate(t.late, frames));
 }
 
 }  // namespace

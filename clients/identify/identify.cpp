@@ -66,7 +66,8 @@ void assess(Findings& f, const Fitter& fitter, const MeasuredSet& train, const M
   f.replicates = replicates_of(all, times.horizon_s);
   f.unexplained = find_unexplained(
       gives_errors(f.held_out) ? evaluation.set() : train, fitted_windows(f.found.fit, fitted, times.horizon_s),
-      windows_of(f.after.tracks, f.after.forecasts, times.horizon_s), f.after.errors, f.bounds, f.replicates);
+      windows_of(f.after.tracks, f.after.forecasts, times.horizon_s), f.after.errors, f.bounds, f.replicates,
+      {std::max(20.0, 2 * times.horizon_s), !f.numbering.anew()});
 }
 
 /// Errors over the horizon, if anything is held out.
@@ -225,10 +226,10 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
     for (Track& track : run.tracks) track.held_out = track.chooses = false;
   choose_and_judge(f, fitter, train, test != nullptr ? all_fitted : train, evaluation, reported);
   say_progress(0.91, "what is left unexplained");
-  assess(f, fitter, train, test, evaluation, reported);
   f.numbering = numbering_of(fitter, f.base);
   // An effect that the base model lacks makes the robots' speeds differ from run to run.
   if (f.numbering.anew()) f.numbering = numbering_of(fitter, f.found.fit);
+  assess(f, fitter, train, test, evaluation, reported);
   f.uncertainty = uncertainty_of(fitter, f.found.fit);
   f.noise = fitter.noise_interval(f.found.fit);
   if (f.found.fit.model.base.command_lag_s != 0) f.command_lag_s = fitter.command_lag_interval(f.found.fit);

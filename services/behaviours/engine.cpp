@@ -512,6 +512,8 @@ const Fault* BehavioursEngine::transmit(std::uint32_t i, const Executor& executo
   if (const Fault* const fault = executor.transmit(message, cycles)) return fault;
   if (robot.returned != 0) return nullptr;
   const Executor::Main rest = executor.run_main(std::max(span.call_cycles - before + first.left, 0), 0);
+  // The callback may have changed what the call does: a delay() in it goes on in the next tick.
+  if (rest.left < 0) robot.debt_cycles += static_cast<std::uint64_t>(-rest.left);
   if (rest.preempted) ++robot.waits;
   return rest.fault;
 }

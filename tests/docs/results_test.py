@@ -128,7 +128,8 @@ class Pages(unittest.TestCase):
         self.assertEqual(results.readable("| 30359 +-1.7e+02 | 108227.5 | 1.0201e+05 (3 %) |"), "| 30,359 +-170 | 108,227.5 | 102,010 (3 %) |")
 
     def test_a_mean_has_its_standard_error(self):
-        self.assertEqual(results.mean_and_error([9, 11]), "10 +- 1")
+        self.assertEqual(results.mean_and_error([9, 11]), "10.0 +- 1.0")
+        self.assertEqual(results.mean_and_error([152.31, 152.35, 152.33]), "152.330 +- 0.012")
         self.assertEqual(results.mean_and_error([3]), "3 +- 0")
 
     def test_a_program_that_prints_other_lines_ends_the_writer(self):

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
 
 #include "clients/identify/identify.hpp"
 #include "clients/identify/predict/evaluation.hpp"

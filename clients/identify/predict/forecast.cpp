@@ -83,6 +83,7 @@ class JointForecast {
   /// Advances to a time. Robots see each other on a time raster.
   void advance_to(double to_s) {
     constexpr double kRaster_s = 0.25;
+    end_s_ = to_s;
     while (now_s_ < to_s - 1e-9) {
       const double next = neighbours_ ? std::min(to_s, now_s_ + kRaster_s) : to_s;
       see(next - now_s_);
@@ -131,6 +132,8 @@ class JointForecast {
     double sample_s = std::numeric_limits<double>::quiet_NaN();
     std::optional<Eigen::Vector2d> at_sample_mm;  ///< mean path, before the end
   };
+  /// Samples nearer to the predicted time are taken as measured at it.
+  static constexpr double kSame_s = 0.01;
   /// The mean path at a time within a step, with the robot's present view of its neighbours.
   static Eigen::Vector2d path_at(const Robot& robot, double time_s) {
     Eigen::Vector2d mean = Eigen::Vector2d::Zero();
@@ -145,7 +148,6 @@ class JointForecast {
   }
   /// The prediction at the sample: that at the end, shifted along the mean path.
   void set_sample(const Robot& robot, Forecast& out) const {
-    constexpr double kSame_s = 0.01;
     out.sample_s = robot.sample_s;
     out.sample_x_mm = out.x_mm;
     out.sample_y_mm = out.y_mm;
@@ -213,7 +215,8 @@ class JointForecast {
   }
   void advance(double to_s) {
     for (Robot& robot : robots_) {
-      if (!robot.filters.empty() && robot.now_s < robot.sample_s && robot.sample_s <= to_s)
+      if (!robot.filters.empty() && robot.now_s < robot.sample_s && robot.sample_s <= to_s &&
+          robot.sample_s < end_s_ - kSame_s)
         robot.at_sample_mm = path_at(robot, robot.sample_s);
       for (TrackFilter& filter : robot.filters)
         sub_steps(*robot.view->clock, robot.now_s, to_s, [&](double t, double h, const CommandState& commands) {
@@ -240,7 +243,7 @@ class JointForecast {
 
   const MotionModel& model_;
   const bool neighbours_;
-  double now_s_;
+  double now_s_, end_s_ = 0;
   const Edges edges_;
   TrafficGrids grids_;
   const TrafficGrids& initial_grids_;

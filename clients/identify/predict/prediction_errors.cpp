@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "core/random/random.hpp"
+#include "core/stats/distributions.hpp"
 #include "core/stats/quantiles.hpp"
 #include "core/stats/resampling.hpp"
 
@@ -112,9 +113,12 @@ std::optional<ErrorBounds> bounds_of(const MeasuredSet& set, const PredictionErr
 }
 
 std::optional<StretchBounds> bounds_of(const std::vector<Stretch>& stretches) {
-  constexpr std::size_t kFewest = 12;
+  constexpr std::size_t kFewest = 6;
   if (stretches.size() < kFewest) return std::nullopt;
   const Random random(20180729);
+  const auto count = static_cast<double>(stretches.size());
+  const double wider = stats::student_quantile(0.975, count - 1) / stats::student_quantile(0.975, 1e6) *
+                       std::sqrt(count / (count - 1));
   std::vector<double> error, less;
   for (std::int64_t k = 0; k < kDraws; ++k) {
     const std::vector<double> times = drawn(random, stretches.size(), k, 2);
@@ -127,7 +131,13 @@ std::optional<StretchBounds> bounds_of(const std::vector<Stretch>& stretches) {
     error.push_back(std::sqrt(sum.before_mm2 / sum.rows));
     less.push_back(error.back() - std::sqrt(sum.after_mm2 / sum.rows));
   }
-  return StretchBounds{middle_95(error), middle_95(less)};
+  const auto interval = [&](std::vector<double>& values) {
+    const Interval middle = middle_95(values);
+    const double centre_mm = stats::interpolated_quantile(values, 0.5);
+    return Interval{centre_mm - wider * (centre_mm - middle.low_mm),
+                    centre_mm + wider * (middle.high_mm - centre_mm)};
+  };
+  return StretchBounds{interval(error), interval(less)};
 }
 
 std::optional<Replicates> replicates_of(

@@ -43,7 +43,7 @@ struct ErrorBounds {
 [[nodiscard]] std::optional<ErrorBounds> bounds_of(const MeasuredSet&, const PredictionErrors& before,
                                                    const PredictionErrors& after);
 
-/// Sums over successive predictions of one track.
+/// Sums over the predictions of all robots of a run in a stretch of time.
 struct Stretch {
   double before_mm2 = 0, after_mm2 = 0, rows = 0;
 };
@@ -53,7 +53,8 @@ struct StretchBounds {
   Interval before, less_by;
 };
 
-/// A bootstrap over stretches, which must be long enough to be independent. Nothing of fewer than 12.
+/// A bootstrap over stretches, which must be long enough to be independent. The intervals are as much wider as Student's are
+/// for so many values. Nothing of fewer than 6.
 [[nodiscard]] std::optional<StretchBounds> bounds_of(const std::vector<Stretch>&);
 
 /// The part of the error that differs between repetitions of the same commands.

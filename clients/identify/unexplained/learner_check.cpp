@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <map>
 #include <set>
 #include <utility>
@@ -63,9 +62,6 @@ void add(PredictionErrors& to, const Window& w, double square_mm2) {
   ++to.rows;
 }
 
-/// Windows of a stretch: neighbouring windows overlap, so single ones are dependent.
-constexpr double kStretch = 4;
-
 /// Whether each held-out robot has tracks in the fit, too. What is learned then concerns these robots.
 bool robots_are_known(const std::vector<Window>& known, const std::vector<Window>& held_out) {
   std::set<double> robots;
@@ -84,13 +80,12 @@ std::vector<Window> part_of(const std::vector<Window>& all, std::size_t folds, s
 }
 
 std::optional<LearnerCheck> learner_check(const MeasuredSet& set, const std::vector<Window>& known,
-                                          const std::vector<Window>& held_out) {
+                                          const std::vector<Window>& held_out, const Stretches& stretches) {
   const bool cross_validated = held_out.empty();
   if (known.size() < kFewestKnown || (!cross_validated && held_out.size() < kFewestHeldOut)) return std::nullopt;
   const bool in_body = body_is_better(known);
   PredictionErrors with, without;
-  std::deque<Stretch> stretches;
-  std::map<std::pair<std::uint32_t, std::uint32_t>, Stretch*> present;  ///< by track
+  std::map<std::pair<std::uint32_t, double>, Stretch> by_time;  ///< by run and number of the stretch
   const auto judge = [&](const std::vector<Window>& from, const std::vector<Window>& judged) {
     const Eigen::MatrixX2f left = left_of(from, judged, in_body);
     for (std::size_t i = 0; i < judged.size(); ++i) {
@@ -98,11 +93,10 @@ std::optional<LearnerCheck> learner_check(const MeasuredSet& set, const std::vec
                    after_mm2 = static_cast<double>(left.row(static_cast<Eigen::Index>(i)).squaredNorm());
       add(without, judged[i], before_mm2);
       add(with, judged[i], after_mm2);
-      Stretch*& stretch = present[{judged[i].run, judged[i].place}];
-      if (stretch == nullptr || stretch->rows >= kStretch) stretch = &stretches.emplace_back();
-      stretch->before_mm2 += before_mm2;
-      stretch->after_mm2 += after_mm2;
-      stretch->rows += 1;
+      Stretch& stretch = by_time[{judged[i].run, std::floor(judged[i][Feature::kTime] / stretches.length_s)}];
+      stretch.before_mm2 += before_mm2;
+      stretch.after_mm2 += after_mm2;
+      stretch.rows += 1;
     }
   };
   constexpr std::size_t kFolds = 4;
@@ -114,10 +108,12 @@ std::optional<LearnerCheck> learner_check(const MeasuredSet& set, const std::vec
   }
   const std::optional<ErrorBounds> bounds = bounds_of(set, without, with);
   if (!bounds) return std::nullopt;
-  std::optional<StretchBounds> of_these_robots;
-  if (!cross_validated && robots_are_known(known, held_out))
-    of_these_robots = bounds_of({stretches.begin(), stretches.end()});
-  const StretchBounds taken = of_these_robots.value_or(StretchBounds{bounds->before, bounds->less_by});
+  StretchBounds taken{bounds->before, bounds->less_by};
+  if (!cross_validated && stretches.same_robots && robots_are_known(known, held_out)) {
+    std::vector<Stretch> drawn;
+    for (const auto& [when, stretch] : by_time) drawn.push_back(stretch);
+    taken = bounds_of(drawn).value_or(taken);
+  }
   return LearnerCheck{without.rmse_mm(), with.rmse_mm(), taken.less_by, cross_validated, taken.before.low_mm};
 }
 

@@ -21,10 +21,17 @@ struct LearnerCheck {
   [[nodiscard]] double predicted_mm() const;
 };
 
-/// The interval of the reduction concerns these robots if each held-out robot has tracks in the fit, too: a bootstrap over
-/// stretches of 20 s. Else it concerns other robots: a bootstrap over robots and runs. Nothing: too few windows.
+/// What the bounds of held-out robots that have tracks in the fit, too, draw at random: stretches of a run, with all its robots.
+struct Stretches {
+  double length_s = 20;     ///< at least twice the horizon, because windows overlap
+  bool same_robots = true;  ///< whether a robot number means the same robot in all runs
+};
+
+/// The interval of the reduction concerns these robots if each held-out robot has tracks in the fit, too, and there are
+/// enough stretches: a bootstrap over stretches. Else it concerns other robots: a bootstrap over robots and runs. Nothing:
+/// too few windows.
 [[nodiscard]] std::optional<LearnerCheck> learner_check(const MeasuredSet&, const std::vector<Window>& known,
-                                                        const std::vector<Window>& held_out);
+                                                        const std::vector<Window>& held_out, const Stretches& = {});
 
 /// Windows of the tracks with this remainder, or of all others.
 [[nodiscard]] std::vector<Window> part_of(const std::vector<Window>& all, std::size_t folds, std::size_t fold,

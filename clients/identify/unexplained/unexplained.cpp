@@ -123,13 +123,13 @@ bool leaves_systematic_error(const MeasuredSet& set, const std::vector<Window>& 
 
 Unexplained find_unexplained(const MeasuredSet& set, const std::vector<Window>& known,
                              const std::vector<Window>& held_out, const PredictionErrors& errors,
-                             const std::optional<ErrorBounds>& bounds,
-                             const std::optional<Replicates>& replicates) {
+                             const std::optional<ErrorBounds>& bounds, const std::optional<Replicates>& replicates,
+                             const Stretches& stretches) {
   Unexplained u;
   u.error_mm = errors.rmse_mm();
   u.expected_mm = errors.expected_mm();
   if (replicates) u.repetitions_mm = replicates->floor_mm;
-  u.learner = learner_check(set, known, held_out);
+  u.learner = learner_check(set, known, held_out, stretches);
   const Gap gap = largest_gap(u, bounds);
   u.systematic_mm = gap.systematic_mm;
   if (u.large()) {

@@ -98,6 +98,21 @@ TEST(LoopRate, AMessageIsAskedForAtAnyPlaceOfACallThatChangesNothing) {
   EXPECT_NEAR(busy_share("busy = 1; " + wait + " busy = 0; " + wait + wait + wait), 0.25, 0.1);
 }
 
+TEST(LoopRate, ADelayThatTheCallbackCausesLasts) {
+  // kilo_message_tx interrupts a call that then waits for half a second. 160 ticks are 5.2 s.
+  Robot robot(
+      "static volatile uint8_t asked; static uint8_t waits; static volatile uint16_t v;\n"
+      "static message_t* tx(void) { asked = 1; return NULL; }\n"
+      "static void loop(void) { for (uint16_t i = 0; i < 300; ++i) v = 0;\n"
+      "  if (asked) { asked = 0; delay(500); set_motors(++waits, 0); } }\n");
+  const int before = robot.frame().motor_left[0];
+  Air air;
+  air.ask = {0};
+  for (int k = 0; k < 160; ++k) robot.step(air);
+  EXPECT_GE(robot.frame().motor_left[0] - before, 8);
+  EXPECT_LE(robot.frame().motor_left[0] - before, 11);
+}
+
 TEST(LoopRate, MessagesAreSeenOnceEach) {
   Robot robot(
       "static volatile uint8_t is_new; static uint8_t n;\n"
