@@ -123,13 +123,13 @@ double apart(const Place& a, const Place& b) { return std::sqrt(squared(a.x - b.
 double overlap(const Place& a, const Place& b) { return Overlaps::get().at(apart(a, b)); }
 double own_overlap() { return Overlaps::get().at(0); }
 
-/// The least squares fit of some sources, as a Cholesky factor of its normal equations. What a further source would explain costs
+/// The least squares fit of some sources, as a Cholesky factor of its normal equations. The explained part of a further source costs
 /// one triangular solve.
 class Fit {
  public:
   explicit Fit(double pixels) : pixels_(pixels) {}
 
-  /// What the sources of the fit leave of a further one.
+  /// The part of a further source that those of the fit leave.
   struct Rest {
     const Place* place;
     std::array<double, kMostSources> solved;  ///< its products with the sources, divided by the factor

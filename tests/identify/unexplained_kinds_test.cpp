@@ -14,7 +14,7 @@
 namespace kilotwin {
 namespace {
 
-/// What the base model alone leaves: no effect can be named.
+/// The remainder that the base model alone leaves: no effect can be named.
 struct Left {
   identification::Unexplained unexplained;
   double error_mm = 0;  ///< on the tracks that give the error

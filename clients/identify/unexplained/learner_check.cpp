@@ -62,7 +62,7 @@ void add(PredictionErrors& to, const Window& w, double square_mm2) {
   ++to.rows;
 }
 
-/// Whether each held-out robot has tracks in the fit, too. What is learned then concerns these robots.
+/// Whether each held-out robot has tracks in the fit, too. The result then concerns these robots.
 bool robots_are_known(const std::vector<Window>& known, const std::vector<Window>& held_out) {
   std::set<double> robots;
   for (const Window& w : known) robots.insert(w[Feature::kRobot]);

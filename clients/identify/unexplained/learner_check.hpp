@@ -1,4 +1,4 @@
-/// What a random forest over all covariates predicts of the errors of a model.
+/// The part of a model's errors that a random forest over all covariates predicts.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +21,7 @@ struct LearnerCheck {
   [[nodiscard]] double predicted_mm() const;
 };
 
-/// What the bounds of held-out robots that have tracks in the fit, too, draw at random: stretches of a run, with all its robots.
+/// The units that a bootstrap draws for held-out robots that have tracks in the fit, too: stretches of a run, with all robots.
 struct Stretches {
   double length_s = 20;     ///< at least twice the horizon, because windows overlap
   bool same_robots = true;  ///< whether a robot number means the same robot in all runs
