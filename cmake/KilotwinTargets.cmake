@@ -33,6 +33,8 @@ set(kilotwin_precompiled
 if(KILOTWIN_PCH)
   # fmt says by a macro that it is a shared library. All units must agree on it, or the precompiled headers do not fit.
   target_link_libraries(kilotwin_flags INTERFACE fmt::fmt)
+  # ccache finds the precompiled header of a unit by this.
+  target_compile_options(kilotwin_flags INTERFACE $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-fpch-preprocess>)
   file(WRITE ${CMAKE_BINARY_DIR}/precompiled.cpp "")
   add_library(kilotwin_precompiled OBJECT ${CMAKE_BINARY_DIR}/precompiled.cpp)
   target_link_libraries(kilotwin_precompiled PRIVATE kilotwin_flags Eigen3::Eigen protobuf::libprotobuf)
