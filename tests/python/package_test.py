@@ -1,5 +1,6 @@
 """The package against the program: PROGRAM SOURCES are the arguments."""
 
+import contextlib
 import gc
 import importlib.util
 import os
@@ -72,16 +73,17 @@ extern "C" KilobotExperiment* createExpt() { return new Bad; }
 """
 
 
-def free_domain():
-    """A DDS domain that nobody uses: its first discovery port is free."""
-    for domain in range(60, 100):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            try:
-                probe.bind(("127.0.0.1", 7400 + 250 * domain + 10))
-                return domain
-            except OSError:
-                continue
-    raise AssertionError("no domain is free")
+@contextlib.contextmanager
+def own_domain():
+    """A DDS domain that no test beside this one takes: its first discovery port stays bound, as by a participant."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as port:
+        for domain in range(60, 100):
+            with contextlib.suppress(OSError):
+                port.bind(("127.0.0.1", 7400 + 250 * domain + 10))
+                break
+        else:
+            raise AssertionError("no domain is free")
+        yield domain
 
 
 class Package(unittest.TestCase):
@@ -301,7 +303,7 @@ class Package(unittest.TestCase):
                 arena.set_variable("gain", 1)
 
     def test_an_arena_and_a_run_with_the_same_requests_have_the_same_hash(self):
-        domain = free_domain()
+        domain = self.enterContext(own_domain())
         options = ["--robots", "12", "--duration", "600", "--seed", "3"]
         words = ["run", str(EXPERIMENT), *options, "--pace", "1", "--partitions", "2x1", "--quiet", "--domain", str(domain)]
         run = subprocess.Popen([PROGRAM, *words, "--out", str(self.out / "run")])
@@ -343,7 +345,7 @@ class Package(unittest.TestCase):
 
     def test_a_run_is_joined_from_another_thread(self):
         # The run ends when this thread stops it: so run() lets other threads go on meanwhile.
-        domain = free_domain()
+        domain = self.enterContext(own_domain())
         done = []
         options = {"robots": 4, "duration_s": 120, "mode": "federated", "domain": domain, "pace": 1}
         runner = threading.Thread(target=lambda: done.append(kilotwin.run(EXPERIMENT, out=self.out / "run", **options)))

@@ -6,6 +6,7 @@
 #include "clients/recorder/run_directory.hpp"
 #include "core/dds/dds.hpp"
 #include "idl/manifest.pb.h"
+#include "tests/system/own_domain.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::test {
@@ -123,11 +124,12 @@ TEST_F(BadInput, ADomainInUseByAnotherRun) {
 TEST_F(BadInput, ADomainInUseByServicesStartedByHand) {
   const std::string good = experiment("robots { count: 3 " + behaviour() + "}\n");
   ASSERT_EQ(kilotwin({"run", good, "--prepare", "--out", scratch / "first"}, scratch).status, 0);
-  const std::string domain = std::to_string(dds::DomainClaim::any().domain());
-  Process other({program(), "service", "comm", "--run", scratch / "first", "--domain", domain}, scratch.path());
+  const OwnDomain domain;
+  Process other({program(), "service", "comm", "--run", scratch / "first", "--domain", domain.name},
+                scratch.path());
   ASSERT_TRUE(other.says("has waited", 30)) << "it is there, and came first";
-  const Outcome outcome =
-      kilotwin({"run", good, "--domain", domain, "--duration", "100000", "--out", scratch / "second"}, scratch);
+  const Outcome outcome = kilotwin(
+      {"run", good, "--domain", domain.name, "--duration", "100000", "--out", scratch / "second"}, scratch);
   EXPECT_EQ(outcome.status, 2) << outcome.err;
   expect_in("in use by another run", outcome.err);
 }

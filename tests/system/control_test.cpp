@@ -12,6 +12,7 @@
 #include "clients/recorder/reader.hpp"
 #include "core/federation/checkpoint.hpp"
 #include "core/federation/topics.hpp"
+#include "tests/system/own_domain.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::test {
@@ -20,32 +21,21 @@ namespace {
 class Control : public testing::Test {
  protected:
   Control()
-      : domain_(dds::DomainClaim::any().domain()),
-        participant_({domain_, {}}),
-        control_(participant_, topics::run_control()),
-        overhead_(participant_, topics::overhead_packets()),
-        status_(participant_, topics::run_status(), [this](const PublicRunStatus& sample, dds::SampleState state) {
-          if (!state.valid) return;
-          const std::lock_guard lock(mutex_);
-          latest_ = sample;
-        }) {}
+      : control_(domain_.participant, topics::run_control()),
+        overhead_(domain_.participant, topics::overhead_packets()),
+        status_(domain_.participant, topics::run_status(),
+                [this](const PublicRunStatus& sample, dds::SampleState state) {
+                  if (!state.valid) return;
+                  const std::lock_guard lock(mutex_);
+                  latest_ = sample;
+                }) {}
 
   void start(const Words& more = {}) {
-    Words words{program(),
-                "run",
-                source("experiments/disperse.txtpb"),
-                "--robots",
-                "20",
-                "--duration",
-                "600",
-                "--pace",
-                "1",
-                "--partitions",
-                "2x1",
-                "--domain",
-                std::to_string(domain_),
-                "--out",
-                scratch_ / "run"};
+    Words words{program(),      "run",    source("experiments/disperse.txtpb"),
+                "--robots",     "20",     "--duration",
+                "600",          "--pace", "1",
+                "--partitions", "2x1",    "--domain",
+                domain_.name,   "--out",  scratch_ / "run"};
     words.insert(words.end(), more.begin(), more.end());
     process_ = std::make_unique<Process>(words, scratch_.path());
     ASSERT_TRUE(eventually([this] {
@@ -73,8 +63,7 @@ class Control : public testing::Test {
   }
 
   Scratch scratch_;
-  std::uint32_t domain_;
-  dds::Participant participant_;
+  const OwnDomain domain_;
   dds::Writer<PublicRunControl> control_;
   dds::Writer<PublicOverheadPacket> overhead_;
   std::mutex mutex_;
@@ -110,7 +99,7 @@ TEST_F(Control, PausesStepsContinuesAndStops) {
 }
 
 TEST_F(Control, APausedRunWithSeveralDisksIsSavedOnceItGoesOn) {
-  const std::string domain = std::to_string(domain_);
+  const std::string domain = domain_.name;
   ASSERT_EQ(kilotwin({"run", source("experiments/disperse.txtpb"), "--robots", "4", "--duration", "600", "--pace",
                       "1", "--partitions", "1x1", "--prepare", "--out", scratch_ / "run"},
                      scratch_)
@@ -146,7 +135,7 @@ TEST_F(Control, APausedRunWithSeveralDisksIsSavedOnceItGoesOn) {
 
 TEST_F(Control, TheCommandSteersARun) {
   start();
-  const std::string domain = std::to_string(domain_);
+  const std::string domain = domain_.name;
   const auto control = [&](Words words) {
     words.insert(words.begin(), "control");
     words.insert(words.end(), {"--domain", domain, "--json"});
@@ -182,7 +171,7 @@ TEST_F(Control, TheCommandSteersARun) {
 
 TEST_F(Control, ARobotIsPlacedElsewhereAndTheReplayDoesTheSame) {
   start();
-  const Words domain{"--domain", std::to_string(domain_)};
+  const Words domain{"--domain", domain_.name};
   const auto place = [&](Words words) {
     words.insert(words.begin(), {"control", "place"});
     words.insert(words.end(), domain.begin(), domain.end());
@@ -236,7 +225,7 @@ TEST_F(Control, ExternalOverheadPacketsAreStampedRecordedAndReplayed) {
 }
 
 TEST_F(Control, MetricsOfAnotherRunEndTheRunInOneLine) {
-  dds::Writer<WireMetrics> writer(participant_, topics::metrics());
+  dds::Writer<WireMetrics> writer(domain_.participant, topics::metrics());
   start({"--quiet"});
   ASSERT_TRUE(eventually([&] { return writer.readers() > 0; }));
   std::uint64_t part = 1;
@@ -254,7 +243,7 @@ TEST_F(Control, MetricsOfAnotherRunEndTheRunInOneLine) {
 
 TEST_F(Control, RobotStatesArePublished) {
   std::array<std::atomic<int>, 20> seen{};
-  const dds::Reader<PublicRobotState> robots(participant_, topics::robots(),
+  const dds::Reader<PublicRobotState> robots(domain_.participant, topics::robots(),
                                              [&](const PublicRobotState& sample, dds::SampleState state) {
                                                if (state.valid && sample.robot < seen.size()) ++seen[sample.robot];
                                              });

@@ -6,6 +6,7 @@
 #include <mutex>
 
 #include "clients/doors/ros2/ros2_door.hpp"
+#include "tests/system/own_domain.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::test {
@@ -15,8 +16,6 @@ namespace ros2 = doors::ros2;
 
 class Doors : public testing::Test {
  protected:
-  /// The run claims its domain itself: the claim that finds it is given back.
-  Doors() : ros(dds::DomainClaim::any()), run(dds::DomainClaim::any().domain()) {}
   /// An experiment with two simulated and three tracked robots, and the door.
   std::string experiment(const std::string& door) const {
     const std::string file = scratch / "lab.txtpb";
@@ -25,14 +24,13 @@ class Doors : public testing::Test {
                     door + " }\n");
     return file;
   }
-  dds::DomainClaim ros;
-  std::uint32_t run;
+  const OwnDomain ros, run;
   Scratch scratch;
 };
 
 TEST_F(Doors, RosSeesTheRobotsOfARun) {
   const std::string file = experiment("ros2 { publish { poses: '/kilotwin/poses' clock: true } }");
-  const dds::Participant node(ros2::transport_of({ros.domain(), false, {}, {}}));
+  const dds::Participant node(ros2::transport_of({ros.number, false, {}, {}}));
   std::mutex mutex;
   std::vector<double> x_m;
   int clocks = 0;
@@ -50,13 +48,10 @@ TEST_F(Doors, RosSeesTheRobotsOfARun) {
                                          const std::lock_guard lock(mutex);
                                          clocks += state.valid ? 1 : 0;
                                        });
-  Process simulation(
-      {program(), "run", file, "--pace", "1", "--domain", std::to_string(run), "--out", scratch / "run"},
-      scratch.path());
+  Process simulation({program(), "run", file, "--pace", "1", "--domain", run.name, "--out", scratch / "run"},
+                     scratch.path());
   const Scratch other;
-  Process door(
-      {program(), "ros2", file, "--domain", std::to_string(run), "--ros-domain", std::to_string(ros.domain())},
-      other.path());
+  Process door({program(), "ros2", file, "--domain", run.name, "--ros-domain", ros.name}, other.path());
   EXPECT_TRUE(eventually([&] {
     const std::lock_guard lock(mutex);
     return x_m.size() == 5 && clocks > 2;
@@ -78,9 +73,9 @@ TEST_F(Doors, RosSeesTheRobotsOfARun) {
 TEST_F(Doors, ALogIsPlayedOnceSomebodyReads) {
   const std::string file = experiment("log {}");
   write(scratch / "a.log", "0\t0\t1\t1000\t900\t90\n0.05\t0\t1\t1010\t900\t90\n0.1\t2\t3\t1020\t900\t90\n");
-  Process play({program(), "play", file, scratch / "a.log", "--domain", std::to_string(run)}, scratch.path());
-  EXPECT_TRUE(play.says("waits for a run on domain " + std::to_string(run), 30));
-  const dds::Participant reader({run, {}});
+  Process play({program(), "play", file, scratch / "a.log", "--domain", run.name}, scratch.path());
+  EXPECT_TRUE(play.says("waits for a run on domain " + run.name, 30));
+  const dds::Participant reader({run.number, {}});
   std::mutex mutex;
   std::vector<std::pair<std::uint32_t, double>> seen;  // robot, x
   std::vector<std::int64_t> captured;

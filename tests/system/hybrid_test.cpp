@@ -15,6 +15,7 @@
 
 #include "clients/recorder/reader.hpp"
 #include "core/federation/topics.hpp"
+#include "tests/system/own_domain.hpp"
 #include "tests/system/program.hpp"
 #include "tests/system/synthetic_tracker.hpp"
 
@@ -42,25 +43,15 @@ std::vector<CirclingRobot> three_robots(double radius_mm) {
 
 class Hybrid : public testing::Test {
  protected:
-  Hybrid() : domain_(dds::DomainClaim::any().domain()), participant_({domain_, {}}) {}
-
   /// Runs `experiment` in real time with a tracker that sees from the start; returns its summary.
   Json run(const std::string& experiment, const Words& more) {
-    SyntheticTracker tracker(participant_, {}, three_robots(radius_mm_));
+    SyntheticTracker tracker(domain_.participant, {}, three_robots(radius_mm_));
     return run(experiment, more, {&tracker});
   }
   Json run(const std::string& experiment, const Words& more, const std::vector<SyntheticTracker*>& trackers) {
     write(scratch_ / "hybrid.txtpb", experiment);
-    Words words{program(),
-                "run",
-                scratch_ / "hybrid.txtpb",
-                "--pace",
-                "1",
-                "--domain",
-                std::to_string(domain_),
-                "--out",
-                scratch_ / "run",
-                "--quiet"};
+    Words words{program(),    "run",   scratch_ / "hybrid.txtpb", "--pace", "1", "--domain",
+                domain_.name, "--out", scratch_ / "run",          "--quiet"};
     words.insert(words.end(), more.begin(), more.end());
     Process process(words, scratch_.path());
     for (SyntheticTracker* const tracker : trackers) {
@@ -81,8 +72,7 @@ class Hybrid : public testing::Test {
   }
 
   Scratch scratch_;
-  std::uint32_t domain_;
-  dds::Participant participant_;
+  const OwnDomain domain_;
   double radius_mm_ = 100;
 };
 
@@ -161,7 +151,7 @@ TEST_F(Hybrid, TwoTrackersShareTheRobots) {
   of_wall[1].until_s = of_wall[0].until_s;
   of_wall[2].from_s = 0;
   const TrackerKind wall{"wall", -5, 50, -20, 1.5707963267948966};
-  SyntheticTracker first(participant_, {}, of_ceiling), second(participant_, wall, of_wall);
+  SyntheticTracker first(domain_.participant, {}, of_ceiling), second(domain_.participant, wall, of_wall);
   const Json summary = run(
       experiment("tracker { source: \"wall\" x_mm: 50 y_mm: -20 heading_deg: 90 } tracking { start: WHEN_SEEN }"),
       {"--duration", "6"}, {&first, &second});
@@ -220,7 +210,8 @@ TEST_F(Hybrid, RealAndSimulatedRobotsHearEachOther) {
   std::mutex mutex;
   std::vector<double> told_s;
   const dds::Reader<PublicStationPacket> packets(
-      participant_, topics::station_packets(), [&](const PublicStationPacket& packet, dds::SampleState state) {
+      domain_.participant, topics::station_packets(),
+      [&](const PublicStationPacket& packet, dds::SampleState state) {
         if (!state.valid || packet.command != 2 || packet.message[9] != 0) return;
         // The first of the three slots: 10 bits of id, 4 of type, 10 of data.
         const int id = packet.message[0] << 2 | packet.message[1] >> 6, type = packet.message[1] >> 2 & 15;
@@ -229,7 +220,7 @@ TEST_F(Hybrid, RealAndSimulatedRobotsHearEachOther) {
       });
   const Scratch of_listener;
   Process listener(
-      {program(), "listen", scratch_ / "hybrid.txtpb", scratch_ / "line.txt", "--domain", std::to_string(domain_)},
+      {program(), "listen", scratch_ / "hybrid.txtpb", scratch_ / "line.txt", "--domain", domain_.name},
       of_listener.path());
   EXPECT_TRUE(listener.says("listens to", 30));
   std::jthread talker([this](const std::stop_token& stop) {
@@ -267,10 +258,10 @@ TEST_F(Hybrid, RealAndSimulatedRobotsHearEachOther) {
 TEST_F(Hybrid, ARunThatFallsBehindItsPaceEndsWithStatus1) {
   write(scratch_ / "late.txtpb", experiment());
   Process process({program(), "run", scratch_ / "late.txtpb", "--pace", "1", "--max-lateness", "300", "--domain",
-                   std::to_string(domain_), "--out", scratch_ / "run"},
+                   domain_.name, "--out", scratch_ / "run"},
                   scratch_.path());
   std::atomic<std::int64_t> tick{0};
-  const dds::Reader<PublicRunStatus> status(participant_, topics::run_status(),
+  const dds::Reader<PublicRunStatus> status(domain_.participant, topics::run_status(),
                                             [&](const PublicRunStatus& sample, dds::SampleState state) {
                                               if (state.valid) tick = sample.tick;
                                             });

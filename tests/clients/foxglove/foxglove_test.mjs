@@ -23,19 +23,18 @@ try {
 
 const scratch = fs.mkdtempSync(path.join(os.tmpdir(), "kilotwin-foxglove-"));
 const started = [];
-/** A DDS domain whose first port nobody has; `kilotwin run` refuses one that another run has claimed. */
-async function freeDomain() {
+/** A DDS domain that no test beside this one takes: its first port stays bound, as by a participant. */
+async function ownDomain() {
   for (let domain = 60 + (process.pid % 50); ; domain = 1 + (domain % 110)) {
     const socket = dgram.createSocket("udp4");
     const free = await new Promise((done) => {
       socket.once("error", () => done(false));
       socket.bind({ port: 7410 + 250 * domain, exclusive: true }, () => done(true));
     });
-    await new Promise((done) => (free ? socket.close(done) : done()));
     if (free) return String(domain);
   }
 }
-const domain = await freeDomain();
+const domain = await ownDomain();
 const failed = setTimeout(() => {
   console.error("nothing happened for 100 s");
   end(1);

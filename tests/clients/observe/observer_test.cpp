@@ -8,6 +8,7 @@
 
 #include "clients/recorder/reader.hpp"
 #include "idl/experiment.pb.h"
+#include "tests/system/own_domain.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::observe {
@@ -27,10 +28,8 @@ robots { count: 12 behaviour: "disperse.c" layout { grid { pitch_mm: 40 } } }
 recording { every_s: 0.032768 }
 )";
 
-std::uint32_t free_domain() { return dds::DomainClaim::any().domain(); }
-
-test::Words run_of(const std::string& experiment, std::uint32_t domain, const std::string& out) {
-  return {test::program(), "run", experiment, "--quiet", "--domain", std::to_string(domain), "--out", out};
+test::Words run_of(const std::string& experiment, const test::OwnDomain& domain, const std::string& out) {
+  return {test::program(), "run", experiment, "--quiet", "--domain", domain.name, "--out", out};
 }
 
 /// Waits for a kind of news; other news are passed over.
@@ -48,8 +47,8 @@ class ObserverTest : public testing::Test {
 };
 
 TEST_F(ObserverTest, SeesTheStatesThatAreRecorded) {
-  const std::uint32_t domain = free_domain();
-  Observer observer({domain, {}});
+  const test::OwnDomain domain;
+  Observer observer({domain.number, {}});
   test::Words words = run_of(scratch / "observed.txtpb", domain, scratch / "run");
   words.insert(words.end(), {"--pace", "4", "--partitions", "2x1", "--hosts", "2"});
   Process run(words, scratch.path());
@@ -100,8 +99,8 @@ TEST_F(ObserverTest, SeesTheStatesThatAreRecorded) {
 }
 
 TEST_F(ObserverTest, OutlivesARunAndFindsTheNext) {
-  const std::uint32_t domain = free_domain();
-  Observer observer({domain, {}});
+  const test::OwnDomain domain;
+  Observer observer({domain.number, {}});
   std::uint64_t first = 0;
   for (const char* out : {"first", "second"}) {
     Process run(run_of(scratch / "observed.txtpb", domain, scratch / out), scratch.path());
@@ -119,13 +118,13 @@ TEST_F(ObserverTest, AStalledObserverChangesNothing) {
   const auto hash_of = [&](const std::string& out) {
     return recorder::read_summary(scratch / (out + "/summary.json")).state_hash;
   };
-  const std::uint32_t domain = free_domain();
+  const test::OwnDomain domain;
   const std::string experiment = scratch / "observed.txtpb";
   test::Words words = run_of(experiment, domain, scratch / "alone");
   words.insert(words.end(), {"--duration", "200"});
   ASSERT_EQ(Process(words, scratch.path()).wait().status, 0);
 
-  Process probe({KILOTWIN_PROBE, std::to_string(domain)}, scratch.path());
+  Process probe({KILOTWIN_PROBE, domain.name}, scratch.path());
   words[7] = scratch / "observed";
   Process run(words, scratch.path());
   ASSERT_TRUE(probe.says("sees the run", 60));

@@ -11,9 +11,9 @@
 #include <regex>
 
 #include "clients/recorder/summary.hpp"
-#include "core/dds/dds.hpp"
 #include "tests/clients/view/recordings.hpp"
 #include "tests/clients/view/websocket_client.hpp"
+#include "tests/system/own_domain.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::view {
@@ -35,7 +35,7 @@ class Gateway {
  public:
   Gateway(const test::Words& more, const Scratch& scratch) : scratch_(scratch) {
     std::filesystem::create_directories(scratch_ / "gateway");
-    test::Words words{KILOTWIN_VIEW_PROGRAM, "view", "--domain", std::to_string(domain)};
+    test::Words words{KILOTWIN_VIEW_PROGRAM, "view", "--domain", domain.name};
     words.insert(words.end(), more.begin(), more.end());
     process = std::make_unique<Process>(words, scratch_ / "gateway");
     EXPECT_TRUE(process->says("kilotwin: open", 60));
@@ -48,15 +48,15 @@ class Gateway {
     EXPECT_TRUE(std::regex_search(text, found, std::regex("127\\.0\\.0\\.1:(\\d+)"))) << text;
     return static_cast<std::uint16_t>(std::stoi(found[1]));
   }
-  const std::uint32_t domain = dds::DomainClaim::any().domain();
+  const test::OwnDomain domain;
   std::unique_ptr<Process> process;
 
  private:
   const Scratch& scratch_;
 };
 
-test::Words run_of(const std::string& experiment, std::uint32_t domain, const std::string& out) {
-  return {test::program(), "run", experiment, "--quiet", "--domain", std::to_string(domain), "--out", out};
+test::Words run_of(const std::string& experiment, const test::OwnDomain& domain, const std::string& out) {
+  return {test::program(), "run", experiment, "--quiet", "--domain", domain.name, "--out", out};
 }
 
 class LiveGateway : public testing::Test {
