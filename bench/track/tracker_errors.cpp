@@ -1,6 +1,7 @@
 // The errors of a camera tracker over minutes, in the terms of the station's camera model (station { camera { } }): a run's own
-// trajectories are rendered as pictures of ARK's scale and tracked. Usage: tracker_errors NAME TRAJECTORIES.csv SIDE_mm
+// trajectories are rendered as pictures of ARK's scale and tracked. Usage: tracker_errors NAME TRAJECTORIES.csv SIDE_mm [LED_DEGREES]
 //
+// LED_DEGREES: the direction of the LEDs from the headings, if the tracker is to know it from the start.
 // Prints a row of a table. The trajectories come from `kilotwin export --trajectories --every PERIOD`; there is a picture for each of
 // their times. SIDE_mm: of the arena. bench/camera-model makes the trajectories, and writes the page.
 #include <fmt/format.h>
@@ -29,6 +30,7 @@ constexpr double kPixelsPerMm = 1;
 constexpr double kMargin_mm = 50;        ///< around the arena, in the picture
 constexpr double kMatch_mm = 8;          ///< a track farther away is not this robot's
 constexpr double kSwapDistance_mm = 40;  ///< default of the camera model
+constexpr double kNormal975 = 1.959964;
 constexpr double kSettled_s =
     10;  ///< from the first picture; the tracker has its robots then, and headings of those that drive
 
@@ -62,6 +64,7 @@ struct Robot {
 struct Tally {
   double robot_s = 0, close_pair_s = 0, missed_s = 0, square_mm = 0, heading_rad = 0;
   long sightings = 0, headings = 0, losses = 0, led_wrong = 0, late = 0;
+  long beyond = 0;             ///< headings whose error exceeds what 95 % of a normal distribution do not
   long swaps = 0;              ///< pairs of which one robot is followed by the track that followed the other
   std::vector<double> cpu_ms;  ///< of each picture
 };
@@ -111,8 +114,10 @@ class Judge {
     if (mine == nullptr) return std::nullopt;
     ++tally.sightings;
     tally.square_mm += off_mm * off_mm;
-    if (const auto heading = mine->heading_filter.heading()) {
-      tally.heading_rad += std::abs(wrapped(heading->heading_rad - truth.pose.heading_rad));
+    if (const auto heading = mine->heading()) {
+      const double off_rad = std::abs(wrapped(heading->heading_rad - truth.pose.heading_rad));
+      tally.heading_rad += off_rad;
+      tally.beyond += off_rad > kNormal975 * std::sqrt(heading->variance_rad2) ? 1 : 0;
       ++tally.headings;
     }
     tally.led_wrong += track::bits_of(*mine->led_read) != truth.led ? 1 : 0;
@@ -131,7 +136,6 @@ double cpu_s() {
 /// A rate of independent events: count per `unit`, and the 95 % interval of Poisson counts by Byar's approximation (Breslow and
 /// Day 1987).
 std::string rate(long count, double units) {
-  constexpr double kNormal975 = 1.959964;
   const auto k = static_cast<double>(count);
   const auto bound = [](double n, double z) {
     const double root = 1 - 1 / (9 * n) + z / (3 * std::sqrt(n));
@@ -148,9 +152,10 @@ void print(const char* name, Tally t) {
   double cpu_ms = 0;
   for (const double one : t.cpu_ms) cpu_ms += one;
   fmt::print(
-      "| {} | {:.2f} | {:.3f} | {:.1f} | {} | {} | {:.2f} | {} | {:.3g} | {:.0f}, {:.0f} | {} |\n", name,
+      "| {} | {:.2f} | {:.3f} | {:.1f} | {:.1f} | {} | {} | {:.2f} | {} | {:.3g} | {:.0f}, {:.0f} | {} |\n", name,
       t.robot_s / 3600, std::sqrt(t.square_mm / static_cast<double>(2 * std::max(1L, t.sightings))),
       180 / kPi * t.heading_rad / static_cast<double>(std::max(1L, t.headings)),
+      100 * static_cast<double>(t.beyond) / static_cast<double>(std::max(1L, t.headings)),
       // Readings of one robot in successive pictures depend on each other: no interval.
       fmt::format("{:.2g}", static_cast<double>(t.led_wrong) / static_cast<double>(std::max(1L, t.sightings))),
       rate(t.losses, t.robot_s / 3600), t.losses == 0 ? 0 : t.missed_s / static_cast<double>(t.losses),
@@ -161,8 +166,8 @@ void print(const char* name, Tally t) {
 }  // namespace
 
 int main(int count, char** words) {
-  if (count != 4) {
-    std::fprintf(stderr, "usage: tracker_errors NAME TRAJECTORIES.csv SIDE_mm\n");
+  if (count != 4 && count != 5) {
+    std::fprintf(stderr, "usage: tracker_errors NAME TRAJECTORIES.csv SIDE_mm [LED_DEGREES]\n");
     return 2;
   }
   cv::setNumThreads(1);
@@ -178,8 +183,10 @@ int main(int count, char** words) {
   camera.blur_px = 0.7;
   cameras::Renderer renderer(World(experiment), camera);
   const double half_px = 0.5 * (side_px - 1);
+  track::FollowLimits limits;
+  if (count == 5) limits.led_from_heading_rad = std::atof(words[4]) * kPi / 180;
   track::PictureTracker tracker(
-      track::FloorMap::plane({kPixelsPerMm, 0, half_px, 0, -kPixelsPerMm, half_px, 0, 0, 1}));
+      track::FloorMap::plane({kPixelsPerMm, 0, half_px, 0, -kPixelsPerMm, half_px, 0, 0, 1}), limits);
   Judge judge;
   cv::Mat picture;
   std::uint64_t number = 0;

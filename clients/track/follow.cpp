@@ -24,7 +24,14 @@ constexpr double kTopSpeed_mm_s = 35;
 
 }  // namespace
 
-Follower::Follower(FollowLimits limits) : limits_(limits) {}
+Follower::Follower(FollowLimits limits) : limits_(limits), led_bearing_(limits.led_from_heading_rad) {}
+
+std::optional<Heading> Track::heading() const {
+  std::optional<Heading> heading = heading_filter.heading();
+  // A robot's LED is wrong by the same angle in all pictures. So the filter, which takes the errors as independent, is too sure.
+  if (heading && shows_heading) heading->variance_rad2 += kRobotsDiffer_rad * kRobotsDiffer_rad;
+  return heading;
+}
 
 void Follower::predict(double time_s) {
   time_s_ = std::max(time_s_, time_s);
@@ -47,7 +54,9 @@ void Follower::take(Track& track, std::size_t index, const Sighting& sighting) {
   track.led_read = sighting.led;
   track.path.add(time_s_, sighting.x_mm, sighting.y_mm);
   const double sd_mm = std::sqrt(0.5 * (sighting.error.xx + sighting.error.yy));
-  if (const auto shown = shown_heading(track, sighting))
+  const std::optional<ShownHeading> shown = shown_heading(track, sighting);
+  track.shows_heading = shown.has_value();
+  if (shown)
     track.heading_filter.update(time_s_, sighting.x_mm, sighting.y_mm, sd_mm, shown->heading_rad, shown->sd_rad);
   else
     track.heading_filter.update(time_s_, sighting.x_mm, sighting.y_mm, sd_mm);
@@ -70,8 +79,7 @@ std::optional<Follower::ShownHeading> Follower::heading_of(LedBearing& mounted, 
   if (driven_rad) mounted.add(bearing_rad, *driven_rad);
   const std::optional<LedMount> mount = mounted.mount();
   if (!mount) return std::nullopt;
-  // Errors of successive frames go together: each counts for less.
-  return ShownHeading{wrapped(bearing_rad - mount->from_heading_rad), 3 * mount->sd_rad};
+  return ShownHeading{wrapped(bearing_rad - mount->from_heading_rad), mount->sd_rad};
 }
 
 void Follower::miss(Track& track) const {

@@ -40,8 +40,12 @@ struct Track {
   bool doubt = false;                   ///< it may have exchanged its identity with another track
   bool confirmed = false;
 
+  /// On the floor; nothing until it has moved, or has shown its heading.
+  [[nodiscard]] std::optional<Heading> heading() const;
+
   // Only the follower uses these.
   StraightPath path;
+  bool shows_heading = false;     ///< in the last picture in which it was seen
   std::optional<Led> led_read{};  ///< of the last picture
   int frames = 0, hits = 0;       ///< while it is not confirmed
 };
@@ -50,6 +54,8 @@ struct FollowLimits {
   double robot_radius_mm = kRobotRadius_mm;
   double predict_s = 0.5;  ///< a track not seen for longer is lost
   double forget_s = 30;    ///< a lost track is given up
+  /// The direction of the LEDs from the robots' headings, where it is known; otherwise it is learned.
+  std::optional<double> led_from_heading_rad{};
 };
 
 class Follower {

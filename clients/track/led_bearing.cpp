@@ -8,10 +8,11 @@
 namespace kilotwin::track {
 namespace {
 
-constexpr double kEnough = 60;         ///< readings
-constexpr std::size_t kWindow = 6;     ///< bins, 60 degrees, around the mode
-constexpr double kAgreement = 0.6;     ///< share of the readings in the window
-constexpr double kLeastSd_rad = 0.05;  ///< of one reading: robots are not built alike
+constexpr double kEnough = 60;           ///< readings
+constexpr double kWindow_rad = kPi / 3;  ///< around the mode
+constexpr double kAgreement = 0.6;       ///< share of the readings in the window
+/// Reach of the biweight kernel, rad. Robots that slide give readings farther off than this on one side: they must not pull.
+constexpr double kReach_rad = 0.26;
 /// Old readings lose weight beyond this count: a camera may be turned.
 constexpr double kMostWeight = 20000;
 
@@ -20,37 +21,51 @@ constexpr double kDriven_mm = 10;     ///< in the whole time
 
 }  // namespace
 
+LedBearing::LedBearing(std::optional<double> known_rad) : known_rad_(known_rad) {}
+
 void LedBearing::add(double bearing_rad, double heading_rad) {
-  double total = 0;
-  for (const Bin& bin : bins_) total += bin.count;
-  if (total >= kMostWeight) {
-    for (Bin& bin : bins_) bin = {bin.count / 2, bin.cos / 2, bin.sin / 2};
+  if (total_ >= kMostWeight) {
+    for (double& count : counts_) count /= 2;
+    total_ /= 2;
   }
   const double off = wrapped(bearing_rad - heading_rad);
-  const auto index = static_cast<std::size_t>((off + kPi) / (2 * kPi) * kBins);
-  Bin& bin = bins_.at(std::min(index, kBins - 1));
-  bin.count += 1;
-  bin.cos += std::cos(off);
-  bin.sin += std::sin(off);
+  const auto bin = static_cast<std::size_t>((off + kPi) / kBin_rad);
+  counts_.at(std::min(bin, kBins - 1)) += 1;
+  total_ += 1;
 }
 
 std::optional<LedMount> LedBearing::mount() const {
-  double total = 0;
-  Bin best;
-  for (std::size_t first = 0; first < kBins; ++first) {
-    total += bins_.at(first).count;
-    Bin window;
-    for (std::size_t i = 0; i < kWindow; ++i) {
-      const Bin& bin = bins_.at((first + i) % kBins);
-      window = {window.count + bin.count, window.cos + bin.cos, window.sin + bin.sin};
+  if (known_rad_) return LedMount{*known_rad_, kRobotsDiffer_rad};
+  return learned_mount();
+}
+
+std::optional<LedMount> LedBearing::learned_mount() const {
+  if (total_ < kEnough) return std::nullopt;
+  // The mode: where the readings are densest by a biweight kernel.
+  const auto reach = static_cast<std::size_t>(kReach_rad / kBin_rad);
+  std::array<double, kBins> density{};
+  for (std::size_t i = 0; i < kBins; ++i) {
+    for (std::size_t j = 0; j <= 2 * reach; ++j) {
+      const double u = (static_cast<double>(j) - static_cast<double>(reach)) * kBin_rad / kReach_rad;
+      density.at(i) += counts_.at((i + kBins + j - reach) % kBins) * (1 - u * u) * (1 - u * u);
     }
-    if (window.count > best.count) best = window;
   }
-  if (total < kEnough || best.count < kAgreement * total) return std::nullopt;
-  const double agreement = std::hypot(best.cos, best.sin) / best.count;
-  // Circular standard deviation.
-  const double sd = std::sqrt(-2 * std::log(std::min(agreement, 1 - 1e-9)));
-  return LedMount{std::atan2(best.sin, best.cos), std::max(kLeastSd_rad, sd)};
+  const auto mode = static_cast<std::size_t>(std::max_element(density.begin(), density.end()) - density.begin());
+  // Of the readings around it.
+  double near = 0, near_weight = 0, shift = 0, square = 0;
+  for (std::size_t i = 0; i < kBins; ++i) {
+    const double off = wrapped(offset_of(i) - offset_of(mode)), u = off / kReach_rad;
+    if (std::abs(off) <= 0.5 * kWindow_rad) near += counts_.at(i);
+    if (std::abs(u) >= 1) continue;
+    const double weight = counts_.at(i) * (1 - u * u) * (1 - u * u);
+    near_weight += weight;
+    shift += weight * off;
+    square += weight * off * off;
+  }
+  if (near < kAgreement * total_) return std::nullopt;
+  shift /= near_weight;
+  const double sd_rad = std::sqrt(square / near_weight - shift * shift);
+  return LedMount{wrapped(offset_of(mode) + shift), std::max(kRobotsDiffer_rad, sd_rad)};
 }
 
 void StraightPath::add(double time_s, double x_mm, double y_mm) {

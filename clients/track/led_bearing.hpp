@@ -1,13 +1,15 @@
 /// The direction in which robots carry their LED, learned from robots that drive straight.
 ///
 /// The LED lies off the disc's centre, in the same direction from the heading on all robots of one kind. Once this direction is
-/// known, a lit LED gives the heading at once, at rest too. The direction is the mode of the readings: robots that slide along a wall
-/// seem to drive straight, and give readings of any direction.
+/// known, a lit LED gives the heading at once, at rest too. The direction is the mode of the readings, where a kernel makes
+/// them densest: robots that slide along a wall seem to drive straight, and give readings of any direction.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <optional>
+
+#include "core/base/pose.hpp"
 
 namespace kilotwin::track {
 
@@ -16,19 +18,29 @@ struct LedMount {
   double sd_rad = 0;            ///< of a heading that follows from one reading
 };
 
+/// Standard deviation of a robot's own direction about the common one, rad: robots are not built alike. An estimate; nothing
+/// published states it.
+inline constexpr double kRobotsDiffer_rad = 0.05;
+
 class LedBearing {
  public:
+  /// `known_rad`: the direction, if it is known; then no reading changes it.
+  explicit LedBearing(std::optional<double> known_rad = std::nullopt);
   /// A reading of a robot whose heading follows from its path.
   void add(double bearing_rad, double heading_rad);
-  /// Nothing before enough readings agree.
+  /// Nothing before enough readings agree, unless it is known.
   [[nodiscard]] std::optional<LedMount> mount() const;
 
  private:
-  static constexpr std::size_t kBins = 36;
-  struct Bin {
-    double count = 0, cos = 0, sin = 0;
-  };
-  std::array<Bin, kBins> bins_;
+  static constexpr std::size_t kBins = 360;
+  static constexpr double kBin_rad = 2 * kPi / kBins;
+  /// The middle of a bin.
+  static double offset_of(std::size_t bin) { return (static_cast<double>(bin) + 0.5) * kBin_rad - kPi; }
+  [[nodiscard]] std::optional<LedMount> learned_mount() const;
+
+  std::optional<double> known_rad_;
+  std::array<double, kBins> counts_{};  ///< of readings less headings, by bins from -pi on
+  double total_ = 0;
 };
 
 /// The heading of a robot whose path over the last two seconds is straight; fed with each measured centre.

@@ -25,8 +25,8 @@ std::vector<Circle> near(const std::vector<Circle>& discs, const Point& place, d
 
 }  // namespace
 
-PictureTracker::PictureTracker(std::optional<FloorMap> floor)
-    : floor_(std::move(floor)), calibrated_(floor_.has_value()) {}
+PictureTracker::PictureTracker(std::optional<FloorMap> floor, FollowLimits limits)
+    : floor_(std::move(floor)), calibrated_(floor_.has_value()), follower_(limits) {}
 
 std::optional<double> PictureTracker::radius_px(const cv::Size& picture) const {
   if (detector_.look()) return detector_.look()->radius_px;
@@ -127,7 +127,7 @@ std::vector<TrackedRobot> PictureTracker::process(const cv::Mat& picture, double
     robot.state = track.state;
     robot.position = {track.position.x_mm(), track.position.y_mm()};
     robot.covariance = track.position.covariance();
-    robot.heading = track.heading_filter.heading();
+    robot.heading = track.heading();
     robot.led = track.led;
     robot.led_known = track.sighting.has_value();
     robot.disc = track.sighting ? found[*track.sighting].disc

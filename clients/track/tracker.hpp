@@ -31,7 +31,7 @@ struct TrackedRobot {
 class PictureTracker {
  public:
   /// Without `floor` the scale follows from the size of the robots.
-  explicit PictureTracker(std::optional<FloorMap> floor = std::nullopt);
+  explicit PictureTracker(std::optional<FloorMap> floor = std::nullopt, FollowLimits limits = {});
 
   /// `picture`: 8 bits, blue, green, red or grey. Times ascend. Robots that are not confirmed are left out.
   [[nodiscard]] std::vector<TrackedRobot> process(const cv::Mat& picture, double time_s);

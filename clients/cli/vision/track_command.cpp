@@ -23,6 +23,7 @@
 #include "clients/track/source.hpp"
 #include "clients/track/tracker.hpp"
 #include "core/base/error.hpp"
+#include "core/base/pose.hpp"
 #include "core/base/say.hpp"
 #include "core/csv/csv_writer.hpp"
 #include "core/os/interrupt.hpp"
@@ -40,6 +41,7 @@ struct TrackArguments {
   std::vector<std::string> peers;
   track::SourceOptions of_source;
   double square_mm = 0, disc_height_mm = 0;
+  std::optional<double> led_direction_deg;
   bool force = false, quiet = false, identify = false;
 };
 
@@ -224,6 +226,16 @@ View open_view(const TrackArguments& arguments) {
   return view;
 }
 
+void say_led_direction(const track::PictureTracker& tracker) {
+  const std::optional<track::LedMount> mount = tracker.follower().led_bearing().mount();
+  if (!mount) return;
+  const double direction_deg = mount->from_heading_rad * 180 / kPi;
+  say(fmt::format(
+      "track: the LEDs are at {:.0f} degrees from the headings, by the robots that drove straight; next time, "
+      "--led-direction {:.0f} gives headings from the first picture on",
+      direction_deg, direction_deg));
+}
+
 int follow_robots(const TrackArguments& arguments) {
   View view = open_view(arguments);
   const std::optional<track::FloorMap> floor = view.floor;
@@ -242,7 +254,9 @@ int follow_robots(const TrackArguments& arguments) {
   if (arguments.identify) identifier.emplace(stream->participant());
 
   catch_interrupts();
-  track::PictureTracker tracker(floor);
+  track::FollowLimits limits;
+  if (arguments.led_direction_deg) limits.led_from_heading_rad = *arguments.led_direction_deg * kPi / 180;
+  track::PictureTracker tracker(floor, limits);
   track::FrameQueue frames(std::move(source));
   Report report(arguments.quiet);
   ScaleCheck scale;
@@ -264,6 +278,7 @@ int follow_robots(const TrackArguments& arguments) {
   if (table) table->close();
   scale.end(tracker, picture);
   report.end(frames.dropped());
+  if (!arguments.quiet && !arguments.led_direction_deg) say_led_direction(tracker);
   return kDone;
 }
 
@@ -322,6 +337,12 @@ Command add_track(CLI::App& program) {
       ->type_name("NAME");
   app.add_flag("--identify", arguments->identify,
                "robots get the numbers to which they answer when the station of the run asks for them");
+  app.add_option("--led-direction", arguments->led_direction_deg,
+                 "direction of the LEDs from the robots' headings, anticlockwise; without it, the tracker learns "
+                 "it from robots "
+                 "that drive straight, which it cannot in a jam")
+      ->type_name("DEGREES")
+      ->check(CLI::Range(-360.0, 360.0).description(""));
   app.add_option("--rate", arguments->of_source.rate_hz, "pictures per second of a directory")
       ->check(CLI::PositiveNumber.description(""))
       ->capture_default_str()

@@ -143,10 +143,41 @@ TEST(LedDirection, IsLearnedFromStraightPaths) {
   }
   ASSERT_TRUE(among_slides.mount());
   EXPECT_NEAR(among_slides.mount()->from_heading_rad, -0.83, 0.03);
+  // Slides of all angles up to 90 degrees, on one side: their mean would be 16 degrees off.
+  LedBearing along_walls;
+  std::uniform_real_distribution<double> slide(0, kPi / 2);
+  for (int i = 0; i < 2000; ++i) {
+    const double heading = any(random);
+    along_walls.add(heading - 0.83 + (i % 3 == 0 ? slide(random) : 0.3 * noise(random)), heading);
+  }
+  ASSERT_TRUE(along_walls.mount());
+  EXPECT_NEAR(along_walls.mount()->from_heading_rad, -0.83, 0.03);
   // Readings that do not agree teach nothing.
   LedBearing loose;
   for (int i = 0; i < 500; ++i) loose.add(any(random), any(random));
   EXPECT_FALSE(loose.mount());
+}
+
+TEST(LedDirection, ThatIsKnownGivesTheHeadingOfARobotThatNeverMoves) {
+  const auto heading_of = [](std::optional<double> known_rad) {
+    FollowLimits limits;
+    limits.led_from_heading_rad = known_rad;
+    Follower follower(limits);
+    Sighting sighting = at(0, 0);
+    sighting.led = Led::kRed;
+    sighting.led_bearing_rad = 1.0;
+    for (int frame = 0; frame < 200; ++frame) {
+      follower.predict(frame / 30.0);
+      follower.update({sighting});
+    }
+    return follower.tracks().front().heading();
+  };
+  EXPECT_FALSE(heading_of(std::nullopt));
+  const std::optional<Heading> heading = heading_of(-0.8);
+  ASSERT_TRUE(heading);
+  EXPECT_NEAR(heading->heading_rad, 1.8, 1e-3);
+  // Two hundred pictures of one robot do not tell how it differs from the others.
+  EXPECT_GE(heading->variance_rad2, kRobotsDiffer_rad * kRobotsDiffer_rad);
 }
 
 }  // namespace
