@@ -65,7 +65,7 @@ recorder::Summary run(Words words, const Scratch& scratch, const std::string& na
 /// Processes whose command line contains `text`.
 std::vector<pid_t> processes_with(const std::string& text);
 /// Polls until `condition` holds; false after `seconds`, a bound against hanging.
-template <class Condition> bool eventually(Condition condition, double seconds = 30);
+template <class Condition> bool eventually(Condition condition, double seconds = 90);
 
 void sleep_briefly();
 double now_s();
