@@ -36,9 +36,9 @@ async function ownDomain() {
 }
 const domain = await ownDomain();
 const failed = setTimeout(() => {
-  console.error("nothing happened for 100 s");
+  console.error("nothing happened for 240 s");
   end(1);
-}, 100000);
+}, 240000);
 function end(status) {
   for (const child of started) child.kill("SIGINT");
   fs.rmSync(scratch, { recursive: true, force: true });
