@@ -101,7 +101,7 @@ endfunction()
 function(kilotwin_test name)
   cmake_parse_arguments(arg "ALONE" "TIMEOUT" "SOURCES;DEPENDS;LABELS;SLOW_CASES" ${ARGN})
   if(NOT arg_TIMEOUT)
-    set(arg_TIMEOUT 120)
+    set(arg_TIMEOUT 300)
   endif()
   if(NOT arg_LABELS)
     set(arg_LABELS fast)
@@ -112,10 +112,10 @@ function(kilotwin_test name)
   kilotwin_precompile(${name} FROM kilotwin_precompiled_test)
   kilotwin_unite(${name})
   list(JOIN arg_SLOW_CASES ":" slow)
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 TEST_FILTER "-${slow}"
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 300 TEST_FILTER "-${slow}"
     PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}" RUN_SERIAL "${arg_ALONE}")
   if(slow)
-    gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 TEST_FILTER "${slow}" TEST_LIST ${name}_SLOW_TESTS
+    gtest_discover_tests(${name} DISCOVERY_TIMEOUT 300 TEST_FILTER "${slow}" TEST_LIST ${name}_SLOW_TESTS
       PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS slow)
   endif()
   if(arg_LABELS STREQUAL fast)
