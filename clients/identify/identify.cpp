@@ -68,7 +68,7 @@ void assess(Findings& f, const Fitter& fitter, const MeasuredSet& train, const M
   f.unexplained = find_unexplained(
       gives_errors(f.held_out) ? evaluation.set() : train, fitted_windows(f.found.fit, fitted, times.horizon_s),
       windows_of(f.after.tracks, f.after.forecasts, times.horizon_s), f.after.errors, f.bounds, f.replicates,
-      {std::max(20.0, 2 * times.horizon_s), !f.numbering.anew()});
+      threads, {std::max(20.0, 2 * times.horizon_s), !f.numbering.anew()});
 }
 
 /// Errors over the horizon, if anything is held out.
@@ -150,7 +150,8 @@ Search found_by_search(const Fitter& fitter, const FitState& base, const Measure
     const FitState white = with_white_noise(fitter, fit);
     const std::vector<Forecast> sure = forecast(white.model, fit.tracks, times, Tracks::kFit, options.threads);
     errors.expected_mm2 = errors_of(train, free_ones(fit.model, fit.tracks, sure, options.horizon_s)).expected_mm2;
-    return leaves_systematic_error(train, windows_of(fit.tracks, free, options.horizon_s), errors);
+    return leaves_systematic_error(train, windows_of(fit.tracks, free, options.horizon_s), errors,
+                                   options.threads);
   };
   found = search(fitter, base, log, leaves_much);
   log.begin(kTermChecks, "search", "checking each effect", found.fit.model.terms.size());

@@ -4,6 +4,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/ml.hpp>
 
+#include "core/os/worker_pool.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -25,10 +27,11 @@ struct RandomForest::Forests {
   std::array<cv::Ptr<cv::ml::RTrees>, 2> of;
 };
 
-RandomForest::RandomForest(const Eigen::MatrixXf& covariates, const Eigen::MatrixX2f& targets)
+RandomForest::RandomForest(const Eigen::MatrixXf& covariates, const Eigen::MatrixX2f& targets, std::uint32_t threads)
     : forests_(std::make_unique<Forests>()) {
   const cv::Mat inputs = matrix_of(covariates);
-  for (int k = 0; k < 2; ++k) {
+  os::in_parallel(forests_->of.size(), threads, [&](std::size_t k) {
+    // OpenCV has a generator of random numbers per thread.
     cv::setRNGSeed(kSeed);
     cv::Ptr<cv::ml::RTrees> forest = cv::ml::RTrees::create();
     forest->setMaxDepth(kDepth);
@@ -36,9 +39,9 @@ RandomForest::RandomForest(const Eigen::MatrixXf& covariates, const Eigen::Matri
     forest->setActiveVarCount(inputs.cols / 2 + 1);
     forest->setCalculateVarImportance(false);
     forest->setTermCriteria({cv::TermCriteria::MAX_ITER, kTrees, 0});
-    forest->train(inputs, cv::ml::ROW_SAMPLE, matrix_of(targets.col(k)));
-    forests_->of[static_cast<std::size_t>(k)] = forest;
-  }
+    forest->train(inputs, cv::ml::ROW_SAMPLE, matrix_of(targets.col(static_cast<Eigen::Index>(k))));
+    forests_->of[k] = forest;
+  });
 }
 
 RandomForest::~RandomForest() = default;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -10,8 +11,8 @@ namespace kilotwin::identify {
 /// Predicts a vector of two components from covariates, one forest per component.
 class RandomForest {
  public:
-  /// One row per example. Equal arguments give equal forests.
-  RandomForest(const Eigen::MatrixXf& covariates, const Eigen::MatrixX2f& targets);
+  /// One row per example. Equal examples give equal forests, whatever the number of threads.
+  RandomForest(const Eigen::MatrixXf& covariates, const Eigen::MatrixX2f& targets, std::uint32_t threads);
   ~RandomForest();
   RandomForest(const RandomForest&) = delete;
   RandomForest& operator=(const RandomForest&) = delete;
