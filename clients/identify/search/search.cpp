@@ -285,6 +285,7 @@ class Loop {
                             std::abs(numbers[1]) * (extent_.y_high_mm - extent_.y_low_mm)) /
                            (2 * M_PI);
     if (periods < kFewestPeriods && stripes < kFewestStripes) return false;
+    say(kAddition, "fitting " + wave.term.name);
     return fits(std::move(wave), kWave);
   }
   /// Adds the general term with the most evidence that fits, if much is left unexplained. Returns whether there is one.

@@ -6,23 +6,23 @@
 namespace kilotwin::identify {
 namespace {
 
-/// Relative to the fit of the base model, as measured on scenes of tests/identify with 24 robots. A run corrects them by its own times.
+/// In seconds of two quiet cores, as measured on scenes of tests/identify with 24 robots. A run corrects them by its own times.
 /// `bench/identification remaining` compares the estimates with the time that remained.
 struct Cost {
   double base, by_term;
 };
 constexpr std::array<Cost, kReport + 1> kCosts = {{
-    {1, 0},      // kBaseModel
+    {0.8, 0},    // kBaseModel
     {3.5, 0},    // kTest
-    {1.5, 1.5},  // kAddition
-    {0, 1.3},    // kAlternatives
-    {1.5, 0.2},  // kGeneralTerms
-    {0, 0.4},    // kTermChecks
-    {4, 2},      // kLastCheck
-    {1.2, 0.3},  // kErrors
-    {4.5, 0},    // kUnexplained
+    {3.5, 0.5},  // kAddition
+    {0, 1.1},    // kAlternatives
+    {1.2, 0},    // kGeneralTerms
+    {0, 0.35},   // kTermChecks
+    {3.7, 1.5},  // kLastCheck
+    {1, 0.25},   // kErrors
+    {1.2, 0},    // kUnexplained
     {0.3, 0},    // kHorizon
-    {0.6, 0},    // kSimulation
+    {0.8, 0},    // kSimulation
     {1, 0},      // kReport
 }};
 
