@@ -52,9 +52,12 @@ void Progress::show(double share, const std::string& what, const std::string& pa
   change(share, what, part, {});
 }
 
-void Progress::follow(std::function<Shown(double)> now, const std::string& part) { change(0, part, part, std::move(now)); }
+void Progress::follow(std::function<Shown(double)> now, const std::string& part) {
+  change(0, part, part, std::move(now));
+}
 
-void Progress::change(double share, const std::string& what, const std::string& part, std::function<Shown(double)> now) {
+void Progress::change(double share, const std::string& what, const std::string& part,
+                      std::function<Shown(double)> now) {
   if (!shown_) return;
   const std::lock_guard lock(mutex_);
   if (!part.empty() && !watcher_.joinable()) watcher_ = std::thread([this] { watch(); });

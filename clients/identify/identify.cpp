@@ -150,8 +150,7 @@ Search found_by_search(const Fitter& fitter, const FitState& base, const Measure
     const FitState white = with_white_noise(fitter, fit);
     const std::vector<Forecast> sure = forecast(white.model, fit.tracks, times, Tracks::kFit, options.threads);
     errors.expected_mm2 = errors_of(train, free_ones(fit.model, fit.tracks, sure, options.horizon_s)).expected_mm2;
-    return leaves_systematic_error(train, windows_of(fit.tracks, free, options.horizon_s), errors,
-                                   options.threads);
+    return leaves_systematic_error(train, windows_of(fit.tracks, free, options.horizon_s), errors, options.threads);
   };
   found = search(fitter, base, log, leaves_much);
   log.begin(kTermChecks, "search", "checking each effect", found.fit.model.terms.size());
@@ -221,7 +220,9 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   Findings f{base, found_by_search(fitter, base, train, times, options, log)};
   f.held_out = evaluation.held_out();
   f.model_file = options.model_file;
-  const auto begin = [&](WorkKind kind, const char* stage) { log.begin(kind, stage, "", f.found.fit.model.terms.size()); };
+  const auto begin = [&](WorkKind kind, const char* stage) {
+    log.begin(kind, stage, "", f.found.fit.model.terms.size());
+  };
   begin(kLastCheck, "last check on held-out data");
   MeasuredSet all_fitted = train;
   for (Run& run : all_fitted.runs)

@@ -68,7 +68,7 @@ void note_dropped(Findings& f, const Stage& last) {
 /// The model without one term, on the tracks that choose.
 struct Trial {
   FitState without;
-  Judged judged;       ///< of the model without it
+  Judged judged;     ///< of the model without it
   HeldOutGain gain;  ///< of the model with the term over the one without
   bool useless;
 };

@@ -56,7 +56,7 @@ std::optional<TimeLeft::Estimate> TimeLeft::at(double now_s) const {
   for (const WorkLeft& w : now_->left) {
     const Rate rate = rate_of(w.kind);
     out.likely_s += rate.likely * w.likely;
-    out.most_s += rate.most * std::max(w.most, w.likely);
+    out.most_s += rate.most * w.most;
   }
   return out;
 }

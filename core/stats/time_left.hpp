@@ -11,8 +11,8 @@
 
 namespace kilotwin::stats {
 
-/// Units of one kind that follow the present one: the sum of their costs, as expected and at most. A cost is a time in any unit
-/// that all kinds of a computation share.
+/// Units of one kind that follow the present one: the sum of their costs, as expected, and at most, which is no less. A cost is a time
+/// in any unit that all kinds of a computation share.
 struct WorkLeft {
   int kind = 0;
   double likely = 0, most = 0;
@@ -21,8 +21,8 @@ struct WorkLeft {
 /// A unit of work that begins; or the present one, which goes on with another activity.
 struct Work {
   static constexpr int kSame = -1;  ///< kind: no unit begins
-  std::string stage;     ///< "search, round 2"
-  std::string activity;  ///< "fitting; accepted: speed-by-time"
+  std::string stage;                ///< "search, round 2"
+  std::string activity;             ///< "fitting; accepted: speed-by-time"
   int kind = 0;
   double cost = 1;
   std::vector<WorkLeft> left = {};  ///< after this unit

@@ -401,7 +401,10 @@ Design design_recording(const DesignQuestion& question, const RecordingCondition
     const double sweeps = kind == kSweep ? options.sweeps - 1 - number : options.sweeps,
                  plays = kind == kSweep ? 1 : options.random_plans - number;
     const std::uint32_t of = kind == kSweep ? options.sweeps : options.random_plans;
-    options.progress({stage, fmt::format("{} of {}", number + 1, of), kind, 1,
+    options.progress({stage,
+                      fmt::format("{} of {}", number + 1, of),
+                      kind,
+                      1,
                       {{kPlay, plays, plays}, {kSweep, sweeps, sweeps}}});
   };
   const Laboratory laboratory(question, conditions, options.threads);

@@ -105,8 +105,8 @@ class Search {
 }  // namespace
 
 FloorFound search_effects(const FloorModel& base, const FloorTarget& target,
-                          const std::vector<FloorTerm>& candidates,
-                          const stats::WorkReport& progress, const FloorNote& note) {
+                          const std::vector<FloorTerm>& candidates, const stats::WorkReport& progress,
+                          const FloorNote& note) {
   return Search(base, target, candidates, progress, note).go();
 }
 

@@ -36,8 +36,7 @@ using FloorNote = std::function<void(const std::string& added, const FloorModel&
 
 /// Starts from a fitted base model.
 [[nodiscard]] FloorFound search_effects(const FloorModel& base, const FloorTarget&,
-                                        const std::vector<FloorTerm>& candidates,
-                                        const stats::WorkReport& progress,
+                                        const std::vector<FloorTerm>& candidates, const stats::WorkReport& progress,
                                         const FloorNote& note);
 
 }  // namespace kilotwin::kilogrid

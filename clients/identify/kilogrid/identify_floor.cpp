@@ -251,8 +251,7 @@ void FloorIdentification::fit_base() {
 
 void FloorIdentification::search() {
   FloorFound found = search_effects(
-      base_, learned_, candidate_terms(floor_),
-      options_.progress ? options_.progress : [](const stats::Work&) {},
+      base_, learned_, candidate_terms(floor_), options_.progress ? options_.progress : [](const stats::Work&) {},
       [&](const std::string& added, const FloorModel& model) { note(added, model); });
   model_ = std::move(found.model);
   gains_ = std::move(found.gains);

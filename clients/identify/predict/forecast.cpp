@@ -336,7 +336,8 @@ namespace {
 
 /// A run under one of the models with different run amplitudes.
 struct RunModel {
-  RunModel(const MotionModel& of, const std::vector<const TrackView*>& views) : model(of), traffic(model, views.size()) {
+  RunModel(const MotionModel& of, const std::vector<const TrackView*>& views)
+      : model(of), traffic(model, views.size()) {
     banks.reserve(views.size());
     for (const TrackView* view : views) banks.emplace_back(model, *view);
   }
@@ -377,8 +378,8 @@ class RunForecasts {
     for (std::size_t first = 0; first < instants_s.size(); first += together) {
       const std::vector<Start> starts = starts_of(
           first, std::vector(instants_s.begin() + static_cast<std::ptrdiff_t>(first),
-                             instants_s.begin() + static_cast<std::ptrdiff_t>(
-                                                      std::min(first + together, instants_s.size()))));
+                             instants_s.begin() +
+                                 static_cast<std::ptrdiff_t>(std::min(first + together, instants_s.size()))));
       std::vector<std::vector<Forecast>> seen(starts.size());
       pool_.for_each(starts.size(), [&](std::size_t k) { seen[k] = forecasts_from(starts[k]); });
       for (const std::vector<Forecast>& at_instant : seen)
@@ -424,16 +425,17 @@ class RunForecasts {
     std::vector<Start> starts;
     for (std::size_t k = 0; k < instants_s.size(); ++k) {
       std::vector<double> log_likelihood(models_.size(), 0.0);
-      for (std::size_t i = 0; i < states.size(); ++i)
-        log_likelihood[i / robots] += states[i][k].log_likelihood();
+      for (std::size_t i = 0; i < states.size(); ++i) log_likelihood[i / robots] += states[i][k].log_likelihood();
       const RunAmplitude::Between between =
           models_.size() > 1 ? amplitude_.mean(log_likelihood) : RunAmplitude::Between{};
-      Start& start = starts.emplace_back(Start{instants_s[k], static_cast<std::uint32_t>(first + k), {}, between.part});
+      Start& start =
+          starts.emplace_back(Start{instants_s[k], static_cast<std::uint32_t>(first + k), {}, between.part});
       const auto add = [&](std::size_t m) {
         std::vector<FilterBank> banks;
         banks.reserve(robots);
         for (std::size_t r = 0; r < robots; ++r) banks.push_back(std::move(states[m * robots + r][k]));
-        Known& known = start.known.emplace_back(Known{&models_[m].model, std::move(banks), TrafficGrids(models_[m].model)});
+        Known& known =
+            start.known.emplace_back(Known{&models_[m].model, std::move(banks), TrafficGrids(models_[m].model)});
         known.grids = models_[m].traffic.at(instants_s[k] - times_.horizon_s, known.pointers());
       };
       add(between.low);

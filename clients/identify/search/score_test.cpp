@@ -286,9 +286,8 @@ ScoreTest::ReducedDictionary ScoreTest::reduced_dictionary() const {
     out.information.middleCols(first, count) =
         information_.block(own_, own_ + first, columns, count) -
         information_.bottomLeftCorner(columns, own_) * by.middleCols(first, count);
-    out.clusters.middleRows(first, count) =
-        clusters_.middleRows(own_ + first, count) -
-        by.middleCols(first, count).transpose() * clusters_.topRows(own_);
+    out.clusters.middleRows(first, count) = clusters_.middleRows(own_ + first, count) -
+                                            by.middleCols(first, count).transpose() * clusters_.topRows(own_);
   });
   return out;
 }
@@ -333,9 +332,8 @@ ScoreTest::Outcome ScoreTest::test(std::uint64_t seed) const {
   Outcome out;
   out.findings.resize(dictionary_.hypotheses.size());
   std::vector<Eigen::VectorXd> log10_p(out.findings.size(), Eigen::VectorXd::Zero(kFlips));
-  os::in_parallel(out.findings.size(), threads_, [&](std::size_t h) {
-    out.findings[h] = finding_of(h, reduced, flipped, log10_p[h]);
-  });
+  os::in_parallel(out.findings.size(), threads_,
+                  [&](std::size_t h) { out.findings[h] = finding_of(h, reduced, flipped, log10_p[h]); });
   Eigen::VectorXd worst = Eigen::VectorXd::Zero(kFlips);
   for (const Eigen::VectorXd& one : log10_p)
     for (Eigen::Index f = 0; f < kFlips; ++f) worst(f) = std::min(worst(f), one(f));

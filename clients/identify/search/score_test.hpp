@@ -40,7 +40,8 @@ class ScoreTest {
   /// Evidence and cross-validated gain of a hypothesis if one term of the model is removed; below 0: none is
   /// removed.
   [[nodiscard]] Finding evidence_of(const Hypothesis&, int without_term) const;
-  [[nodiscard]] std::vector<Finding> evidence_of_each(const std::vector<const Hypothesis*>&, int without_term) const;
+  [[nodiscard]] std::vector<Finding> evidence_of_each(const std::vector<const Hypothesis*>&,
+                                                      int without_term) const;
   /// The same for a term of the model itself.
   [[nodiscard]] Finding evidence_of_term(int term) const;
 

@@ -143,7 +143,8 @@ class Loop {
     const std::vector<Term>& terms = out_.fit.model.terms;
     for (const Term& term : terms) activity += (&term == &terms.front() ? "; accepted: " : ", ") + term.name;
     const int adds = kind == kAddition ? 1 : 0;
-    log_.begin(kind, fmt::format("search, round {}", round_ + 1), activity, terms.size() + static_cast<std::size_t>(adds),
+    log_.begin(kind, fmt::format("search, round {}", round_ + 1), activity,
+               terms.size() + static_cast<std::size_t>(adds),
                limit().empty() ? std::max(0, kMostRounds + 2 * general_terms_ - round_ - adds) : 0);
   }
   /// The tracks of the test. A large set: every n-th unit.

@@ -56,12 +56,15 @@ void WorkLog::begin(WorkKind kind, const std::string& stage, const std::string& 
   stats::Work work{stage, activity, kind, cost_of(kind, now), {}};
   if (most_changes) {
     for (int k = kTest; k <= kGeneralTerms; ++k) {
-      const auto cost = [&](double changes) { return units_left(k, kind, changes) * cost_of(k, now + changes / 2); };
+      const auto cost = [&](double changes) {
+        return units_left(k, kind, changes) * cost_of(k, now + changes / 2);
+      };
       work.left.push_back({k, cost(likely), cost(most)});
     }
   }
   const int first_after = most_changes ? static_cast<int>(kTermChecks) : std::max<int>(kind + 1, kLastCheck);
-  for (int k = first_after; k <= kReport; ++k) work.left.push_back({k, cost_of(k, now + likely), cost_of(k, now + most)});
+  for (int k = first_after; k <= kReport; ++k)
+    work.left.push_back({k, cost_of(k, now + likely), cost_of(k, now + most)});
   report_(work);
 }
 

@@ -15,7 +15,7 @@ enum WorkKind {
   kTest,          ///< of all hypotheses, on the residuals of the model
   kAddition,      ///< of one term: its fit, and backward elimination
   kAlternatives,  ///< of each term, when nothing passes any more
-  kGeneralTerms,       ///< terms without a named form
+  kGeneralTerms,  ///< terms without a named form
   kTermChecks,    ///< the model without each term, on the data of the fit
   kLastCheck,     ///< on held-out data
   kErrors,

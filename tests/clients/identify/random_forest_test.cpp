@@ -68,6 +68,13 @@ TEST(RandomForest, DoesNotDependOnIncreasingMapsOfCovariates) {
   EXPECT_EQ(RandomForest(known.covariates, known.targets, 2).predict(known.covariates), before);
 }
 
+TEST(RandomForest, SplitsACovariateOfTwoValues) {
+  Examples known = examples(300, 1, 0);
+  known.covariates.col(0) = known.covariates.col(0).array().round();
+  known.targets.col(0) = 5 * known.covariates.col(0);
+  EXPECT_LT(error_of(RandomForest(known.covariates, known.targets, 2), known)[0], 0.01F);
+}
+
 TEST(RandomForest, TakesCovariatesThatTellNothing) {
   Examples known = examples(300, 1, 0.2F);
   known.covariates.col(4).setConstant(7);

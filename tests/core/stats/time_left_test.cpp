@@ -10,7 +10,9 @@ namespace {
 
 enum Kind { kFit, kTest };
 
-Work unit(Kind kind, double cost, std::vector<WorkLeft> left) { return {"stage", "activity", kind, cost, std::move(left)}; }
+Work unit(Kind kind, double cost, std::vector<WorkLeft> left) {
+  return {"stage", "activity", kind, cost, std::move(left)};
+}
 
 double likely(const TimeLeft& time, double now_s) { return time.at(now_s)->likely_s; }
 
