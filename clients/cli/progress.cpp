@@ -40,6 +40,8 @@ std::string Progress::line(double share, double seconds, const std::string& what
                      std::floor(100 * part), whole / 60, whole % 60, what.substr(0, kLongest));
 }
 
+double Progress::seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
 bool Progress::due() {
   if (!shown_) return false;
   const std::lock_guard lock(mutex_);
@@ -47,6 +49,15 @@ bool Progress::due() {
 }
 
 void Progress::show(double share, const std::string& what, const std::string& part) {
+  change(share, what, part, {});
+}
+
+void Progress::follow(std::function<Shown(double)> now, const std::string& part) {
+  change(0, part, part, std::move(now));
+}
+
+void Progress::change(double share, const std::string& what, const std::string& part,
+                      std::function<Shown(double)> now) {
   if (!shown_) return;
   const std::lock_guard lock(mutex_);
   if (!part.empty() && !watcher_.joinable()) watcher_ = std::thread([this] { watch(); });
@@ -55,6 +66,7 @@ void Progress::show(double share, const std::string& what, const std::string& pa
   const bool another_part = part != part_;
   what_ = what;
   part_ = part;
+  now_ = std::move(now);
   if (another_part || time_for_another()) print();
 }
 
@@ -75,13 +87,28 @@ void Progress::watch() {
 void Progress::print() {
   const auto now = Clock::now();
   next_ = now + (terminal_ ? kBarPeriod : kLinePeriod);
-  const std::string text = line(share_, std::chrono::duration<double>(now - start_).count(), what_, terminal_);
+  if (now_) {
+    const Shown shown = now_(seconds());
+    share_ = std::max(share_, shown.share);
+    what_ = shown.what;
+  }
+  const std::string text = line(share_, seconds(), what_, terminal_);
   if (terminal_) {
     std::fputs(("\r\x1b[K" + text).c_str(), stderr);
     on_screen_ = true;
   } else {
     say(text);
   }
+}
+
+void WorkProgress::begin(const stats::Work& work) {
+  if (work.kind != stats::Work::kSame) time_left_.begin(progress_.seconds(), work);
+  const std::string part = work.activity.empty() ? work.stage : work.stage + ": " + work.activity;
+  progress_.follow(
+      [time = time_left_, part](double seconds) {
+        return Progress::Shown{time.share(seconds), stats::in_words(time.at(seconds)) + "; " + part};
+      },
+      part);
 }
 
 ProgressBar::ProgressBar(const RunPlan& plan, bool shown)

@@ -3,12 +3,14 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <functional>
 #include <mutex>
 #include <string>
 #include <thread>
 
 #include "core/federation/run_observer.hpp"
 #include "core/plan/plan.hpp"
+#include "core/stats/time_left.hpp"
 
 namespace kilotwin::cli {
 
@@ -26,6 +28,15 @@ class Progress {
   /// change. `part` names a long part of the work: the display changes immediately when the part changes, and its time advances
   /// while the part lasts.
   void show(double share, const std::string& what, const std::string& part = {});
+  /// The same for a display that changes while the part lasts: `now` gives its share and text after so many seconds since the start. It
+  /// is called by any thread, under the lock of this object.
+  struct Shown {
+    double share;
+    std::string what;
+  };
+  void follow(std::function<Shown(double seconds)> now, const std::string& part);
+  /// Since the start.
+  [[nodiscard]] double seconds() const;
   /// Whether show() would change the display. Call it first if the text is costly.
   [[nodiscard]] bool due();
   /// Removes the line from the screen until the next show().
@@ -35,6 +46,7 @@ class Progress {
 
  private:
   using Clock = std::chrono::steady_clock;
+  void change(double share, const std::string& what, const std::string& part, std::function<Shown(double)> now);
   void watch();
   void print();
   [[nodiscard]] bool time_for_another() const { return Clock::now() >= next_; }
@@ -45,9 +57,21 @@ class Progress {
   std::condition_variable changed_;
   double share_ = 0;
   std::string what_, part_;
+  std::function<Shown(double)> now_;  ///< empty: share_ and what_
   Clock::time_point next_;
   bool on_screen_ = false, ends_ = false;
   std::thread watcher_;  ///< updates the time while a part lasts
+};
+
+/// Progress of work that is reported by units: its stage, its activity, and the time that it still takes.
+class WorkProgress {
+ public:
+  explicit WorkProgress(bool shown) : progress_(shown) {}
+  void begin(const stats::Work&);
+
+ private:
+  stats::TimeLeft time_left_;
+  Progress progress_;
 };
 
 /// Progress of a run: simulated time, speed relative to real time, robots, messages, and the federates for which the run waits.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "clients/identify/document.hpp"
@@ -67,7 +68,7 @@ void assess(Findings& f, const Fitter& fitter, const MeasuredSet& train, const M
   f.unexplained = find_unexplained(
       gives_errors(f.held_out) ? evaluation.set() : train, fitted_windows(f.found.fit, fitted, times.horizon_s),
       windows_of(f.after.tracks, f.after.forecasts, times.horizon_s), f.after.errors, f.bounds, f.replicates,
-      {std::max(20.0, 2 * times.horizon_s), !f.numbering.anew()});
+      threads, {std::max(20.0, 2 * times.horizon_s), !f.numbering.anew()});
 }
 
 /// Errors over the horizon, if anything is held out.
@@ -138,7 +139,7 @@ FitState refitted(const Fitter& fitter, const FitState& part, const MeasuredSet&
 
 /// The search on the tracks of the fit; without effects the base model alone.
 Search found_by_search(const Fitter& fitter, const FitState& base, const MeasuredSet& train,
-                       const ForecastTimes& times, const Options& options) {
+                       const ForecastTimes& times, const Options& options, const WorkLog& log) {
   Search found{base, {}, {{base, {}}}, {}, {}, {}, {}};
   if (!options.find_effects) return found;
   const auto leaves_much = [&](const FitState& fit) {
@@ -149,20 +150,17 @@ Search found_by_search(const Fitter& fitter, const FitState& base, const Measure
     const FitState white = with_white_noise(fitter, fit);
     const std::vector<Forecast> sure = forecast(white.model, fit.tracks, times, Tracks::kFit, options.threads);
     errors.expected_mm2 = errors_of(train, free_ones(fit.model, fit.tracks, sure, options.horizon_s)).expected_mm2;
-    return leaves_systematic_error(train, windows_of(fit.tracks, free, options.horizon_s), errors);
+    return leaves_systematic_error(train, windows_of(fit.tracks, free, options.horizon_s), errors, options.threads);
   };
-  const auto progress = [&](double part, const std::string& what) {
-    if (options.progress) options.progress(0.1 + 0.75 * part, what);
-  };
-  found = search(fitter, base, progress, leaves_much);
-  if (options.progress) options.progress(0.85, "evaluating each effect");
+  found = search(fitter, base, log, leaves_much);
+  log.begin(kTermChecks, "search", "checking each effect", found.fit.model.terms.size());
   keep_predictive_terms(fitter, train, times, found);
   return found;
 }
 
-/// The last check; then, beside a test set, the refit to all of the training data; then the errors that are reported.
-void choose_and_judge(Findings& f, const Fitter& fitter, const MeasuredSet& train, const MeasuredSet& whole,
-                      const Evaluation& evaluation, const ForecastTimes& reported) {
+/// The last check; then, beside a test set, the refit to all of the training data.
+void choose(Findings& f, const Fitter& fitter, const MeasuredSet& train, const MeasuredSet& whole,
+            const Evaluation& evaluation, const ForecastTimes& reported) {
   const Evaluation choosing(train, nullptr, Tracks::kChoosing, fitter.threads());
   ForecastTimes fast = reported;
   fast.rollouts = 0;
@@ -172,12 +170,15 @@ void choose_and_judge(Findings& f, const Fitter& fitter, const MeasuredSet& trai
     f.check.chose_on_reported = true;
     choose_on_held_out(f, fitter, evaluation, reported);
   }
-  if (&whole != &train) {
-    f.base = refitted(fitter, f.base, whole);
-    f.found.fit = f.found.fit.model.terms.empty() && f.found.fit.model.base.command_lag_s == 0
-                      ? f.base
-                      : refitted(fitter, f.found.fit, whole);
-  }
+  if (&whole == &train) return;
+  f.base = refitted(fitter, f.base, whole);
+  f.found.fit = f.found.fit.model.terms.empty() && f.found.fit.model.base.command_lag_s == 0
+                    ? f.base
+                    : refitted(fitter, f.found.fit, whole);
+}
+
+/// The errors that are reported.
+void judge(Findings& f, const Fitter& fitter, const Evaluation& evaluation, const ForecastTimes& reported) {
   f.before = evaluation.judge(f.base, reported);
   f.after = evaluation.judge(f.found.fit, reported);
   // A model that diverges gives no prediction for some rows.
@@ -202,9 +203,7 @@ Tracks reporting_tracks(const MeasuredSet& train, const MeasuredSet* test, const
 }  // namespace
 
 Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Options& options) {
-  const auto say_progress = [&](double part, const std::string& what) {
-    if (options.progress) options.progress(part, what);
-  };
+  const WorkLog log(options.progress);
   FitState base(train);
   if (base.tracks.units().empty())
     throw UserError("no track of the training runs has two samples; give longer tracks");
@@ -212,20 +211,26 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   ForecastTimes reported = times;
   reported.rollouts = kRollouts;
 
-  say_progress(0.02, "base model");
+  log.begin(kBaseModel, "base model", "fitting", 0,
+            options.find_effects ? std::optional(kMostRounds) : std::nullopt);
   const Fitter fitter(train, options.threads);
   fitter.fit_base(base);
   const Evaluation evaluation(train, test, reporting_tracks(train, test, base, times, options.threads),
                               options.threads);
-  Findings f{base, found_by_search(fitter, base, train, times, options)};
+  Findings f{base, found_by_search(fitter, base, train, times, options, log)};
   f.held_out = evaluation.held_out();
   f.model_file = options.model_file;
-  say_progress(0.88, "last check on held-out data");
+  const auto begin = [&](WorkKind kind, const char* stage) {
+    log.begin(kind, stage, "", f.found.fit.model.terms.size());
+  };
+  begin(kLastCheck, "last check on held-out data");
   MeasuredSet all_fitted = train;
   for (Run& run : all_fitted.runs)
     for (Track& track : run.tracks) track.held_out = track.chooses = false;
-  choose_and_judge(f, fitter, train, test != nullptr ? all_fitted : train, evaluation, reported);
-  say_progress(0.91, "what is left unexplained");
+  choose(f, fitter, train, test != nullptr ? all_fitted : train, evaluation, reported);
+  begin(kErrors, "prediction errors");
+  judge(f, fitter, evaluation, reported);
+  begin(kUnexplained, "what is left unexplained");
   f.numbering = numbering_of(fitter, f.base);
   // An effect that the base model lacks makes the robots' speeds differ from run to run.
   if (f.numbering.anew()) f.numbering = numbering_of(fitter, f.found.fit);
@@ -240,9 +245,9 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   Identified out;
   out.predictions = predictions_of(f, evaluation.set());
   out.found = document_of(f, train, test, options.horizon_s, options.threads);
-  say_progress(0.93, "errors over the horizon");
+  begin(kHorizon, "errors over the horizon");
   add_horizon(out.found, f, evaluation, options.threads);
-  say_progress(0.95, "simulation check");
+  begin(kSimulation, "simulation check");
   out.model = proto_of(f.found.fit.model);
   write_noise_effects(out.model, f.found.fit.model.noise, f.noise_effects);
   out.candidates = candidates_of(f, fitter);
@@ -256,7 +261,6 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   const Tracks compared = test != nullptr ? Tracks::kAll : Tracks::kHeldOut;
   add_simulation_check({f.base.model, written_before}, {f.found.fit.model, out.model}, f.after.tracks, compared,
                        options.threads, out.found);
-  say_progress(1, "done");
   return out;
 }
 

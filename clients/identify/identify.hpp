@@ -2,13 +2,13 @@
 /// effects. A pure function from measured sets to a model and a result.
 #pragma once
 
-#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "clients/identify/data/measured_set.hpp"
 #include "clients/identify/predict/prediction.hpp"
+#include "core/stats/time_left.hpp"
 #include "idl/identification.pb.h"
 #include "idl/model.pb.h"
 
@@ -21,8 +21,7 @@ struct Options {
   std::uint32_t draws = 0;   ///< models from the posterior; their values may lie outside the ranges of a model file
   /// Where the caller will write the model: for the text of the result.
   std::string model_file = "model.txtpb";
-  /// Progress, 0..1, and the present step.
-  std::function<void(double, const std::string&)> progress;
+  stats::WorkReport progress;  ///< may be empty
 };
 
 struct Identified {

@@ -68,6 +68,7 @@ void note_dropped(Findings& f, const Stage& last) {
 /// The model without one term, on the tracks that choose.
 struct Trial {
   FitState without;
+  Judged judged;     ///< of the model without it
   HeldOutGain gain;  ///< of the model with the term over the one without
   bool useless;
 };
@@ -76,20 +77,22 @@ Trial trial_of(const Fitter& fitter, const FitState& fit, std::size_t t, const E
                const ForecastTimes& times, const Judged& with) {
   FitState without = without_term(fitter, fit, t);
   const double with_mm = with.errors.rmse_mm();
-  const double without_mm = error_mm(choosing.judge(without, times), with.errors.rows);
+  Judged judged = choosing.judge(without, times);
+  const double without_mm = error_mm(judged, with.errors.rows);
   const HeldOutGain gain = held_out_gain(fit.model, without.model, with.tracks, choosing.of(), fitter.threads());
   // Effects of the measurement hardly change predicted positions. They must not raise the error.
   const double least_mm = with_mm * (on_measurement(fit.model.terms[t]) ? 1 - kSameError : 1 + kSameError);
   // A likelihood of few tracks has a large error of its own. Negated, so that a gain that is no number does not pass.
   const bool is_unlikely =
       !(gain.nat + 2 * gain.nat_se >= 0) || (gain.nat < 0 && !(without_mm > with_mm * (1 + kClearError)));
-  return {std::move(without), gain, is_unlikely || without_mm <= least_mm};
+  return {std::move(without), std::move(judged), gain, is_unlikely || without_mm <= least_mm};
 }
 
-/// Takes out terms one at a time: of those that do not help the one with the least gain.
-void take_out_useless(Findings& f, const Fitter& fitter, const Evaluation& choosing, const ForecastTimes& times) {
+/// Takes out terms one at a time: of those that do not help the one with the least gain. `with`: the model, judged. Returns what is
+/// left, judged.
+Judged without_useless(Findings& f, const Fitter& fitter, const Evaluation& choosing, const ForecastTimes& times,
+                       Judged with) {
   for (;;) {
-    const Judged with = choosing.judge(f.found.fit, times);
     f.check.gains.clear();
     std::optional<Trial> worst;
     std::size_t place = 0;
@@ -100,8 +103,9 @@ void take_out_useless(Findings& f, const Fitter& fitter, const Evaluation& choos
       worst = std::move(trial);
       place = t;
     }
-    if (!worst) return;
+    if (!worst) return with;
     take_out(f.found, place, std::move(worst->without));
+    with = std::move(worst->judged);
   }
 }
 
@@ -133,23 +137,24 @@ void keep_predictive_terms(const Fitter& fitter, const MeasuredSet& train, const
 
 void choose_on_held_out(Findings& f, const Fitter& fitter, const Evaluation& choosing, const ForecastTimes& times) {
   const std::vector<Stage> path = path_to(f.found);
-  const std::size_t rows = choosing.judge(path.front().fit, times).errors.rows;
+  std::vector<Judged> judged;
   std::vector<Candidate> candidates;
   for (const Stage& stage : path) {
+    judged.push_back(choosing.judge(stage.fit, times));
     const std::vector<Term>& terms = stage.fit.model.terms;
     const auto moving = std::count_if(terms.begin(), terms.end(), [](const Term& t) { return !on_measurement(t); });
-    candidates.push_back({static_cast<std::size_t>(moving), error_mm(choosing.judge(stage.fit, times), rows)});
+    candidates.push_back({static_cast<std::size_t>(moving), error_mm(judged.back(), judged.front().errors.rows)});
     f.check.path.push_back({effects_of(stage.fit.model), candidates.back().rmse_mm});
   }
   f.check.kept = smallest_of_the_best(candidates);
   f.found.fit = path[f.check.kept].fit;
   f.found.reasons = path[f.check.kept].reasons;
-  take_out_useless(f, fitter, choosing, times);
+  const std::size_t rows = judged.front().errors.rows;
+  const Judged left_over = without_useless(f, fitter, choosing, times, std::move(judged[f.check.kept]));
   const MotionModel &left = f.found.fit.model, &base = path.front().fit.model;
   const bool is_base = left.terms.empty() && left.base.command_lag_s == base.base.command_lag_s;
   // Negated, so that an error that is no number does not pass.
-  if (is_base ||
-      !(error_mm(choosing.judge(f.found.fit, times), rows) <= candidates.front().rmse_mm * (1 + kSameError))) {
+  if (is_base || !(error_mm(left_over, rows) <= candidates.front().rmse_mm * (1 + kSameError))) {
     f.found.fit = path.front().fit;
     f.found.reasons.clear();
     f.check.gains.clear();

@@ -34,7 +34,7 @@ TEST(CommandLag, IsFittedInPlaceOfEffects) {
     FitState base(set);
     const Fitter fitter(set, 2);
     fitter.fit_base(base);
-    const identify::Search found = identify::search(fitter, base, [](double, const std::string&) {});
+    const identify::Search found = identify::search(fitter, base, identify::WorkLog({}));
     for (const identify::Term& term : found.fit.model.terms)
       ADD_FAILURE() << term.name << " at a lag of " << lag_s << " s";
     EXPECT_NEAR(found.fit.model.base.command_lag_s, lag_s, 0.02);

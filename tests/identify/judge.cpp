@@ -8,6 +8,10 @@
 // --robots, --runs and --seconds override a scene's number of robots, number of training runs and their duration.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <spawn.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <cmath>
@@ -124,6 +128,28 @@ std::vector<Prediction> oracle_of(const Scene& scene, const Play& played, int sa
   return oracle;
 }
 
+/// A command that has ended.
+struct Ended {
+  int status = -1;
+  double seconds = 0, cpu_s = 0;
+};
+
+Ended run_in_shell(std::string command) {
+  std::string shell = "sh", option = "-c";
+  char* const words[] = {shell.data(), option.data(), command.data(), nullptr};
+  const auto start = std::chrono::steady_clock::now();
+  pid_t child = 0;
+  Ended out;
+  rusage used{};
+  if (posix_spawn(&child, "/bin/sh", nullptr, nullptr, words, environ) != 0 ||
+      wait4(child, &out.status, 0, &used) != child)
+    throw std::runtime_error("no shell can be started");
+  out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  for (const timeval& of : {used.ru_utime, used.ru_stime})
+    out.cpu_s += static_cast<double>(of.tv_sec) + 1e-6 * static_cast<double>(of.tv_usec);
+  return out;
+}
+
 Verdict try_set(const Arguments& arguments, const Scene& scene, const Play& played,
                 const std::vector<Prediction>& oracle, const fs::path& folder) {
   write_data(scene, played.train, folder / "train");
@@ -134,20 +160,19 @@ Verdict try_set(const Arguments& arguments, const Scene& scene, const Play& play
   const std::string command = fmt::format("{} identify --train {} --test {} --out {} > {} 2>&1",
                                           in_quotes(arguments.program), in_quotes(folder / "train"),
                                           in_quotes(folder / "test"), in_quotes(out), in_quotes(folder / "log"));
-  const auto start = std::chrono::steady_clock::now();
-  const int status = std::system(command.c_str());  // NOLINT(concurrency-mt-unsafe): no handler is changed
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const Ended ended = run_in_shell(command);
   Verdict verdict;
-  if (status == 0) {
+  if (ended.status == 0) {
     verdict = judge(scene, oracle, out);
   } else {
     std::ifstream log(folder / "log");
     std::string line, last;
     while (std::getline(log, line)) last = line;
     verdict.scene = scene.name;
-    verdict.failure = fmt::format("status {}: {}", status, last);
+    verdict.failure = fmt::format("status {}: {}", ended.status, last);
   }
-  verdict.seconds = seconds;
+  verdict.seconds = ended.seconds;
+  verdict.cpu_s = ended.cpu_s;
   return verdict;
 }
 
@@ -165,8 +190,9 @@ Scene scene_of(const Arguments& arguments, const std::string& name) {
 }
 
 void print_header() {
-  fmt::print("{:20} {:>8} {:>8} {:>8} {:>6} | {:>8} {:>8} {:>8} {:>6} | {:>6} {:>5} {:>5}  {}\n", "scene", "before",
-             "after", "oracle", "ratio", "from20s", "after", "oracle", "ratio", "named", "false", "s", "found");
+  fmt::print("{:20} {:>8} {:>8} {:>8} {:>6} | {:>8} {:>8} {:>8} {:>6} | {:>6} {:>5} {:>5} {:>5}  {}\n", "scene",
+             "before", "after", "oracle", "ratio", "from20s", "after", "oracle", "ratio", "named", "false", "s",
+             "cores", "found");
 }
 
 void print_row(const Verdict& v) {
@@ -175,10 +201,11 @@ void print_row(const Verdict& v) {
     return;
   }
   fmt::print(
-      "{:20} {:8.2f} {:8.2f} {:8.2f} {:6.3f} | {:8.2f} {:8.2f} {:8.2f} {:6.3f} | {:>6} {:5} {:5.0f}  {}{}{}{}\n",
+      "{:20} {:8.2f} {:8.2f} {:8.2f} {:6.3f} | {:8.2f} {:8.2f} {:8.2f} {:6.3f} | {:>6} {:5} {:5.0f} {:5.2f}  "
+      "{}{}{}{}\n",
       v.scene, v.before_mm, v.after_mm, v.oracle_mm, v.after_mm / v.oracle_mm, v.later_before_mm, v.later_after_mm,
       v.later_oracle_mm, v.later_after_mm / v.later_oracle_mm, fmt::format("{}/{}", v.named, v.causes),
-      v.false_findings.size(), v.seconds, fmt::join(v.found, ", "),
+      v.false_findings.size(), v.seconds, v.cpu_s / v.seconds, fmt::join(v.found, ", "),
       v.unnamed.empty() ? "" : fmt::format("; not named: {}", fmt::join(v.unnamed, ", ")),
       v.missing_rows == 0 ? "" : fmt::format("; {} rows missing", v.missing_rows), v.good() ? "" : "  <-");
   std::fflush(stdout);

@@ -21,7 +21,7 @@ struct Verdict {
   std::vector<std::string> unnamed;         // true effects and faults not named
   std::vector<std::string> false_findings;  // effects and faults that do not exist
   std::vector<std::string> found;           // "name [covariates]"
-  double seconds = 0;
+  double seconds = 0, cpu_s = 0;
   std::string failure;  // reason for a failure; empty if none
 
   /// Largest ratio of the error to the oracle's.

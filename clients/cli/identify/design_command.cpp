@@ -155,8 +155,8 @@ int plan_recording(const DesignArguments& arguments, const Output& output) {
   inputs.push_back(arguments.result);
   const fs::path fallback = "planned", out = make_plain_output(output, fallback, inputs);
   Unfinished unfinished(out);
-  std::optional<Progress> progress(std::in_place, !arguments.quiet);
-  options.progress = [&](double share, const std::string& what) { progress->show(share, what, what); };
+  std::optional<WorkProgress> progress(std::in_place, !arguments.quiet);
+  options.progress = [&](const stats::Work& work) { progress->begin(work); };
   const identify::Design design = design_recording(question, conditions, options);
   write_plan(design.plan, arguments.every_s, out);
   write_design_report(design, question, models.front().first, out);

@@ -19,6 +19,7 @@
 #include "clients/identify/model/model_file.hpp"
 #include "clients/identify/report/report.hpp"
 #include "clients/identify/result/result_json.hpp"
+#include "clients/identify/search/work.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/experiment/clamp.hpp"
@@ -178,15 +179,12 @@ int identify_data(const IdentifyArguments& arguments) {
   options.threads = arguments.threads;
   options.draws = arguments.draws;
   options.model_file = (out / "model.txtpb").string();
-  std::optional<Progress> progress(std::in_place, !arguments.quiet);
-  // Reading takes the first 2 %, drawing the last 3 %.
-  options.progress = [&](double share, const std::string& what) {
-    progress->show(0.02 + 0.95 * share, what, what);
-  };
-  progress->show(0, "reading " + arguments.train.string(), "reading");
+  std::optional<WorkProgress> progress(std::in_place, !arguments.quiet);
+  options.progress = [&](const stats::Work& work) { progress->begin(work); };
+  progress->begin({"reading", arguments.train.string(), stats::Work::kSame});
   identify::Identified found = kind.identify(train, test, out, options);
 
-  progress->show(0.97, "drawing the report", "drawing");
+  identify::WorkLog(options.progress).begin(identify::kReport, "drawing the report", "", 0);
   clamp_to_ranges(found.model);
   os::write_file(options.model_file,
                  identify::text_of(found.model, fmt::format("Identified from {}.", arguments.train.string())));

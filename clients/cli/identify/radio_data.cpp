@@ -157,7 +157,7 @@ identify::Identified identify_radio_runs(const fs::path& train, const fs::path& 
   fit.out = out / "radio";
   fit.runs = kRuns;
   fit.swarms = kSwarms;
-  fit.progress = options.progress ? options.progress : [](double, const std::string&) {};
+  fit.progress = options.progress ? options.progress : [](const stats::Work&) {};
   const radio_fit::RadioFound fitted = radio_fit::fit_radio(fit);
 
   identify::Identified result;

@@ -36,7 +36,7 @@ identify::Identified identify_trajectories(const std::filesystem::path& train_di
                                            const std::filesystem::path& out, const identify::Options& options) {
   identify::MeasuredSet train = identify::load_or_import(train_directory, out / "imported-train");
   identify::demand_plausible(train, train_directory.string());
-  options.progress(0, "checking for faults of the data");
+  options.progress({"checking for faults of the data", "", stats::Work::kSame});
   // No robot can produce these samples: they are excluded before the fit.
   std::vector<identify::DataFault> faults = identify::exclude_faults(train);
   std::optional<identify::MeasuredSet> test;

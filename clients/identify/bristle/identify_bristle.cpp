@@ -297,6 +297,8 @@ class BristleIdentification {
   [[nodiscard]] Identified result();
 
  private:
+  enum Stage { kSearch, kElimination, kJudgement };
+  void begin(Stage) const;
   static const std::vector<BristleInstant>& demand_instants(const std::vector<BristleInstant>& learned,
                                                             const std::vector<BristleInstant>& judged,
                                                             double horizon_s) {
@@ -364,7 +366,18 @@ std::optional<std::size_t> BristleIdentification::best_addition() const {
   return best;
 }
 
+/// Each addition tests all effects that are off, and half of them are expected to be found.
+void BristleIdentification::begin(Stage stage) const {
+  constexpr std::array kNames{"search", "backward elimination", "errors on held-out runs"};
+  if (!options_.progress) return;
+  const double most = stage == kSearch ? static_cast<double>(kBristleEffects - order_.size()) : 0;
+  stats::Work work{kNames[stage], "", stage, 1, {{kSearch, most / 2, most}}};
+  for (int later = stage + 1; later <= kJudgement; ++later) work.left.push_back({later, 1, 1});
+  options_.progress(work);
+}
+
 void BristleIdentification::search() {
+  begin(kSearch);
   while (const std::optional<std::size_t> best = best_addition()) {
     on_[*best] = true;
     order_.push_back(static_cast<BristleEffect>(*best));
@@ -372,7 +385,7 @@ void BristleIdentification::search() {
     const Errors out = errors_out(on_);
     add_step(kEffects[*best].name, out).set_held_out_gain(now_out_.mean() - out.mean());
     now_out_ = out;
-    if (options_.progress) options_.progress(0.2 + 0.1 * static_cast<double>(order_.size()), kEffects[*best].name);
+    begin(kSearch);
   }
 }
 
@@ -385,6 +398,7 @@ void BristleIdentification::reject(std::size_t effect, const char* why) {
 }
 
 void BristleIdentification::eliminate() {
+  begin(kElimination);
   const Folds folds(learned_, options_.horizon_s);
   for (std::size_t i = order_.size(); i-- > 0;) {
     const std::size_t e = index_of(order_[i]);
@@ -412,6 +426,7 @@ void BristleIdentification::eliminate() {
 }
 
 void BristleIdentification::judge() {
+  begin(kJudgement);
   *out().mutable_before() = accuracy_of(before_out_);
   *out().mutable_after() = accuracy_of(now_out_);
   const double total = before_out_.mean() - now_out_.mean();
@@ -512,7 +527,6 @@ Identified BristleIdentification::result() {
         {run.name, run.robot, judged_[i].time_s, before[i].x_mm, before[i].y_mm, after[i].x_mm, after[i].y_mm});
   }
   identified.found = std::move(found_);
-  if (options_.progress) options_.progress(1, "done");
   return identified;
 }
 

@@ -394,22 +394,31 @@ InformationCurve information_of(const RecordingPlan& plan, const DesignQuestion&
 Design design_recording(const DesignQuestion& question, const RecordingConditions& conditions,
                         const DesignOptions& options) {
   KILOTWIN_DEMAND(!question.models.empty() && options.robots > 0 && options.random_plans > 0);
-  const auto say = [&](std::uint32_t done, const char* what) {
-    if (options.progress)
-      options.progress(static_cast<double>(done) / (options.sweeps + options.random_plans + 1), what);
+  // A sweep tries a change of every robot; the other plans are played once, with contacts.
+  enum Kind { kPlay, kSweep };
+  const auto begin = [&](Kind kind, std::uint32_t number, const char* stage) {
+    if (!options.progress) return;
+    const double sweeps = kind == kSweep ? options.sweeps - 1 - number : options.sweeps,
+                 plays = kind == kSweep ? 1 : options.random_plans - number;
+    const std::uint32_t of = kind == kSweep ? options.sweeps : options.random_plans;
+    options.progress({stage,
+                      fmt::format("{} of {}", number + 1, of),
+                      kind,
+                      1,
+                      {{kPlay, plays, plays}, {kSweep, sweeps, sweeps}}});
   };
   const Laboratory laboratory(question, conditions, options.threads);
   Design design;
   std::vector<RecordingPlan> random;
   for (std::uint32_t n = 0; n < options.random_plans; ++n) {
-    say(n, "random commands");
+    begin(kPlay, n, "random commands");
     random.push_back(random_plan(options, n));
     design.random.push_back(curve_of(laboratory, random.back()));
     design.random_nat += design.random.back().nat.back() / options.random_plans;
   }
   Exchange exchange(laboratory, options);
   for (std::uint32_t s = 0; s < options.sweeps; ++s) {
-    say(options.random_plans + s, "exchanging commands");
+    begin(kSweep, s, "exchanging commands");
     exchange.sweep(s);
   }
   design.planned = curve_of(laboratory, exchange.plan());

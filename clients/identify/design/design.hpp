@@ -2,12 +2,12 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "clients/identify/design/innovations.hpp"
 #include "clients/identify/design/question.hpp"
+#include "core/stats/time_left.hpp"
 
 namespace kilotwin::identify {
 
@@ -19,8 +19,7 @@ struct DesignOptions {
   std::uint32_t threads = 2;
   std::uint32_t sweeps = 200;      ///< trials of another plan for every robot
   std::uint32_t random_plans = 8;  ///< to compare with
-  /// Progress, 0..1, and the present step.
-  std::function<void(double, const std::string&)> progress;
+  stats::WorkReport progress;      ///< may be empty
 };
 
 /// Expected information up to an instant.

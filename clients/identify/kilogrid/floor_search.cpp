@@ -9,18 +9,17 @@
 namespace kilotwin::kilogrid {
 namespace {
 
-constexpr std::size_t kMostEffects = 6;
-
 class Search {
  public:
   Search(const FloorModel& base, const FloorTarget& target, std::vector<FloorTerm> candidates,
-         const std::function<void(double, const std::string&)>& progress, const FloorNote& note)
-      : found_{base, {}, {}}, target_(target), candidates_(std::move(candidates)), note_(note) {
-    progress_ = [this, &progress](const std::string& what) { progress(part_, what); };
+         const stats::WorkReport& report, const FloorNote& note)
+      : found_{base, {}, {}}, target_(target), candidates_(std::move(candidates)), report_(report), note_(note) {
+    progress_ = [this](const std::string& what) { report_({stage_, what, stats::Work::kSame}); };
   }
 
   FloorFound go() {
-    while (found_.gains.size() < kMostEffects && add_one()) part_ = 1 - (1 - part_) * 0.7;
+    while (found_.gains.size() < kMostEffects && add_one()) continue;
+    begin(kWalls, "search, walls");
     const WallGain walls = fit_walls(found_.model, target_, 2, 6000, progress_);
     if (walls.found()) {
       note_(kWallEffect, found_.model);
@@ -28,15 +27,21 @@ class Search {
     } else {
       reject({kWallEffect, std::max(walls.gain, 0.0), walls.needed}, {"position"}, "WHEEL_GAIN");
     }
-    part_ = 0.8;
+    begin(kElimination, "search, backward elimination");
     prune();
     return std::move(found_);
   }
 
  private:
+  void begin(FloorWork kind, const std::string& stage) {
+    stage_ = stage;
+    report_(floor_work(kind, stage_, static_cast<int>(found_.gains.size()) + (kind == kEffect ? 1 : 0), true));
+  }
+
   /// Adds the effect with the most evidence and refits. False if none is significant.
   bool add_one() {
     const std::uint64_t round = found_.gains.size();
+    begin(kEffect, fmt::format("search, round {}", round + 1));
     const Selection choice = choose(found_.model, candidates_, target_, 50 + round, progress_);
     found_.rejected.clear();
     for (std::size_t c = 0; c < candidates_.size(); ++c) {
@@ -91,16 +96,16 @@ class Search {
   FloorFound found_;
   const FloorTarget& target_;
   std::vector<FloorTerm> candidates_;
+  const stats::WorkReport& report_;
   FloorProgress progress_;
+  std::string stage_;
   const FloorNote& note_;
-  double part_ = 0;
 };
 
 }  // namespace
 
 FloorFound search_effects(const FloorModel& base, const FloorTarget& target,
-                          const std::vector<FloorTerm>& candidates,
-                          const std::function<void(double part, const std::string&)>& progress,
+                          const std::vector<FloorTerm>& candidates, const stats::WorkReport& progress,
                           const FloorNote& note) {
   return Search(base, target, candidates, progress, note).go();
 }

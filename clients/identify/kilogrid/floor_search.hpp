@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "clients/identify/kilogrid/floor_selection.hpp"
+#include "clients/identify/kilogrid/floor_work.hpp"
 
 namespace kilotwin::kilogrid {
 
@@ -33,10 +34,9 @@ struct FloorFound {
 /// Called after each addition with the term's name and the model.
 using FloorNote = std::function<void(const std::string& added, const FloorModel&)>;
 
-/// Starts from a fitted base model. `progress` receives the completed share of the search.
+/// Starts from a fitted base model.
 [[nodiscard]] FloorFound search_effects(const FloorModel& base, const FloorTarget&,
-                                        const std::vector<FloorTerm>& candidates,
-                                        const std::function<void(double part, const std::string&)>& progress,
+                                        const std::vector<FloorTerm>& candidates, const stats::WorkReport& progress,
                                         const FloorNote& note);
 
 }  // namespace kilotwin::kilogrid

@@ -159,7 +159,12 @@ class FloorIdentification {
  private:
   [[nodiscard]] identification::Result& out() { return *found_.mutable_result(); }
   void say(const std::string& what) const {
-    if (options_.progress) options_.progress(part_, what);
+    if (options_.progress) options_.progress({stage_, what, stats::Work::kSame});
+  }
+  void begin(FloorWork kind, const char* stage) {
+    stage_ = stage;
+    if (options_.progress)
+      options_.progress(floor_work(kind, stage_, static_cast<int>(effects_of(model_)), options_.find_effects));
   }
   [[nodiscard]] FloorProgress progress() const {
     return [this](const std::string& what) { say(what); };
@@ -180,7 +185,7 @@ class FloorIdentification {
   const Options& options_;
   const Floor floor_;
   identification::Identification found_;
-  double part_ = 0;  ///< completed share
+  std::string stage_;
   std::vector<FloorRun> unlike_;
   const FloorDays days_;
   const FloorTarget learned_, choosing_, held_out_;
@@ -236,7 +241,7 @@ void FloorIdentification::note(const std::string& added, const FloorModel& model
 }
 
 void FloorIdentification::fit_base() {
-  part_ = 0.02;
+  begin(kBase, "base model");
   base_.add(base_term());
   fit_from_far_start(base_, learned_, 1, progress());
   fit(base_, learned_, 2, 1, 1, progress());
@@ -245,13 +250,8 @@ void FloorIdentification::fit_base() {
 }
 
 void FloorIdentification::search() {
-  const double from = 0.15, to = 0.85;
   FloorFound found = search_effects(
-      base_, learned_, candidate_terms(floor_),
-      [&](double done, const std::string& what) {
-        part_ = from + (to - from) * done;
-        say(what);
-      },
+      base_, learned_, candidate_terms(floor_), options_.progress ? options_.progress : [](const stats::Work&) {},
       [&](const std::string& added, const FloorModel& model) { note(added, model); });
   model_ = std::move(found.model);
   gains_ = std::move(found.gains);
@@ -272,8 +272,7 @@ FloorScore FloorIdentification::score_of(const FloorModel& model) const {
 }
 
 void FloorIdentification::choose() {
-  part_ = 0.82;
-  say("last check");
+  begin(kChoice, "last check");
   // Without elimination and without walls it is the last model already.
   if (model_.values != path_.back().model.values || names_of(model_) != path_.back().effects)
     path_.push_back({names_of(model_), model_});
@@ -440,8 +439,7 @@ std::string today() {
 }
 
 void FloorIdentification::judge(const OpenedDays& record) {
-  part_ = 0.85;
-  say("predictions");
+  begin(kPredictions, "predictions");
   const OpenedDays::Opened opened =
       record.open(days_.report, days_.searched(),
                   fmt::format("horizon {} s, effects {}", options_.horizon_s, options_.find_effects), today());
@@ -481,8 +479,7 @@ void FloorIdentification::add_statistics() {
 }
 
 void FloorIdentification::compare_with_days() {
-  part_ = 0.95;
-  say("classifier");
+  begin(kClassifier, "classifier");
   add_statistics();
   std::vector<FloorRun> alike = days_.fit;
   if (!days_.chose_on_reported) alike.insert(alike.end(), days_.choose.begin(), days_.choose.end());
@@ -526,8 +523,6 @@ Identified FloorIdentification::result() {
     identified.predictions.push_back({b.run, b.robot, b.at.time_s, b.at.x_mm, b.at.y_mm, a.at.x_mm, a.at.y_mm});
   }
   identified.found = std::move(found_);
-  part_ = 1;
-  say("done");
   return identified;
 }
 

@@ -53,30 +53,30 @@ class JointForecast {
  public:
   /// `sample_s`: of a track, the instant of a sample, at which its position is predicted, too.
   template <class SampleTime>
-  JointForecast(const MotionModel& model, std::vector<FilterBank>& banks, const TrafficGrids& grids, double from_s,
-                bool neighbours, const SampleTime& sample_s)
+  JointForecast(const MotionModel& model, const std::vector<const FilterBank*>& banks, const TrafficGrids& grids,
+                double from_s, bool neighbours, const SampleTime& sample_s)
       : model_(model),
         neighbours_(neighbours),
         now_s_(from_s),
         edges_(model),
         grids_(grids),
         initial_grids_(grids) {
-    for (FilterBank& bank : banks) {
+    for (const FilterBank* const bank : banks) {
       Robot& robot = robots_.emplace_back();
-      robot.view = &bank.view();
-      if (!bank.started()) continue;
+      robot.view = &bank->view();
+      if (!bank->started()) continue;
       double sum = 0;
-      for (const auto& h : bank.hypotheses()) sum += std::exp(h.log_weight);
-      for (const auto& h : bank.hypotheses()) {
+      for (const auto& h : bank->hypotheses()) sum += std::exp(h.log_weight);
+      for (const auto& h : bank->hypotheses()) {
         robot.filters.push_back(h.filter);
         robot.weights.push_back(std::exp(h.log_weight) / sum);
       }
-      robot.now_s = bank.last_s();
-      robot.sample_s = sample_s(bank.view());
+      robot.now_s = bank->last_s();
+      robot.sample_s = sample_s(bank->view());
       RolloutStart& start = robot.start;
       start.view = robot.view;
       start.weights = robot.weights;
-      for (const auto& h : bank.hypotheses()) start.filters.push_back(&h.filter);
+      for (const auto& h : bank->hypotheses()) start.filters.push_back(&h.filter);
       start.now_s = robot.now_s;
     }
   }
@@ -257,22 +257,22 @@ class TrafficRecord {
  public:
   TrafficRecord(const MotionModel& model, std::size_t robots) : known_(model), next_(robots, 0) {}
 
-  [[nodiscard]] TrafficGrids at(double now_s, const std::vector<FilterBank>& banks) {
+  [[nodiscard]] TrafficGrids at(double now_s, const std::vector<const FilterBank*>& banks) {
     for (std::size_t f = 0; known_.any() && f < banks.size(); ++f) {
-      if (!banks[f].started()) continue;
-      const auto [near, place] = of(banks[f]);
-      for (std::size_t& i = next_[f]; i < near->instants() && is_before(near->time_s(i), banks[f].last_s(), now_s);
+      if (!banks[f]->started()) continue;
+      const auto [near, place] = of(*banks[f]);
+      for (std::size_t& i = next_[f]; i < near->instants() && is_before(near->time_s(i), banks[f]->last_s(), now_s);
            ++i)
         add(place, near->spot(place, i), near->time_s(i), known_);
     }
     TrafficGrids now = known_;
     // From their last samples on, robots count as standing there.
     for (std::size_t f = 0; known_.any() && f < banks.size(); ++f) {
-      if (!banks[f].started() || next_[f] == 0) continue;
-      const auto [near, place] = of(banks[f]);
+      if (!banks[f]->started() || next_[f] == 0) continue;
+      const auto [near, place] = of(*banks[f]);
       RunNeighbours::Spot last = near->spot(place, next_[f] - 1);
       for (std::size_t i = next_[f]; i < near->instants() && near->time_s(i) < now_s - 1e-6; ++i) {
-        last.driven = banks[f].view().clock->at(near->time_s(i) + 1e-9).driven();
+        last.driven = banks[f]->view().clock->at(near->time_s(i) + 1e-9).driven();
         add(place, last, near->time_s(i), now);
       }
     }
@@ -335,50 +335,147 @@ std::optional<Eigen::Vector2d> error_of(const Track& track, const Forecast& f) {
 namespace {
 
 /// A run under one of the models with different run amplitudes.
-struct RunForecast {
-  RunForecast(const MotionModel& of, const std::vector<const TrackView*>& views, bool near)
-      : model(of), neighbours(near), traffic(model, views.size()) {
+struct RunModel {
+  RunModel(const MotionModel& of, const std::vector<const TrackView*>& views)
+      : model(of), traffic(model, views.size()) {
     banks.reserve(views.size());
     for (const TrackView* view : views) banks.emplace_back(model, *view);
   }
-  RunForecast(const RunForecast&) = delete;
-  void advance_to(double to_s) {
-    for (FilterBank& bank : banks) bank.advance_to(to_s);
+  RunModel(const RunModel&) = delete;
+
+  const MotionModel model;
+  std::vector<FilterBank> banks;
+  TrafficRecord traffic;
+};
+
+/// Forecasts of one run. The filters take the measurements up to each start in turn; from there the forecasts are
+/// independent of each other.
+class RunForecasts {
+ public:
+  RunForecasts(const MotionModel& model, std::vector<const TrackView*> views, const ForecastTimes& times,
+               os::WorkerPool& pool)
+      : views_(std::move(views)),
+        times_(times),
+        pool_(pool),
+        all_(looks_at_neighbours(model)),
+        neighbours_(needs_neighbours(model)),
+        amplitude_(model, views_.front()->number) {
+    for (const MotionModel& one : amplitude_.models()) models_.emplace_back(one, views_);
   }
-  [[nodiscard]] double log_likelihood() const {
-    double sum = 0;
-    for (const FilterBank& bank : banks) sum += bank.log_likelihood();
-    return sum;
+  static bool needs_neighbours(const MotionModel& model) {
+    return looks_at_neighbours(model) || model.contacts || TrafficGrids(model).any() || Edges(model).any();
   }
-  /// By track. NaN: no forecast.
-  std::vector<Forecast> at(double from_s, double time_s, std::uint32_t rollouts, bool all,
-                           std::array<std::uint32_t, 2> key) {
-    const TrafficGrids grids = traffic.at(from_s, banks);
-    const auto sample_s = [&](const TrackView& view) {
-      const Sample* const near = sample_near(*view.track, time_s, kNear * (time_s - from_s));
-      return near != nullptr ? near->time_s : std::numeric_limits<double>::quiet_NaN();
-    };
-    JointForecast joint(model, banks, grids, from_s, neighbours, sample_s);
-    joint.advance_to(time_s);
-    if (rollouts > 0 && (model.contacts || grids.any() || Edges(model).any()))
-      joint.draw_rollouts(from_s, rollouts, all, key);
+  /// Of the tracks that count, by instant.
+  std::vector<Forecast> forecasts(Tracks of) {
+    double last_s = 0;
+    for (const TrackView* const view : views_) last_s = std::max(last_s, end_of(view->track->samples));
+    std::vector<double> instants_s;
+    for (int k = 0; first_s() + k * times_.every_s <= last_s + 1e-6; ++k)
+      instants_s.push_back(first_s() + k * times_.every_s);
     std::vector<Forecast> out;
-    for (std::size_t i = 0; i < banks.size(); ++i) {
-      const TrackView& view = banks[i].view();
-      Forecast p{view.run, static_cast<std::uint32_t>(view.place), time_s, 0, 0, 0};
-      if (!joint.expected(i, p)) p.x_mm = std::nan("");
-      if (banks[i].started()) set_start(banks[i], p);
-      out.push_back(p);
+    // The states of the filters at a few starts at a time bound the memory.
+    const std::size_t together = std::size_t{8} * pool_.threads();
+    for (std::size_t first = 0; first < instants_s.size(); first += together) {
+      const std::vector<Start> starts = starts_of(
+          first, std::vector(instants_s.begin() + static_cast<std::ptrdiff_t>(first),
+                             instants_s.begin() +
+                                 static_cast<std::ptrdiff_t>(std::min(first + together, instants_s.size()))));
+      std::vector<std::vector<Forecast>> seen(starts.size());
+      pool_.for_each(starts.size(), [&](std::size_t k) { seen[k] = forecasts_from(starts[k]); });
+      for (const std::vector<Forecast>& at_instant : seen)
+        for (std::size_t i = 0; i < at_instant.size(); ++i)
+          if (!std::isnan(at_instant[i].x_mm) && counts(*views_[i]->track, of)) out.push_back(at_instant[i]);
     }
     return out;
   }
 
-  const MotionModel model;
-  const bool neighbours;
-  std::vector<FilterBank> banks;
-  TrafficRecord traffic;
-
  private:
+  /// One of the models at a start.
+  struct Known {
+    const MotionModel* model;
+    std::vector<FilterBank> banks;
+    TrafficGrids grids;
+    [[nodiscard]] std::vector<const FilterBank*> pointers() const {
+      std::vector<const FilterBank*> all;
+      for (const FilterBank& bank : banks) all.push_back(&bank);
+      return all;
+    }
+  };
+  /// A start, with the one or two models between whose forecasts the result lies.
+  struct Start {
+    double time_s;  ///< that is predicted
+    std::uint32_t number;
+    std::vector<Known> known;
+    double part = 0;  ///< of the second
+  };
+  [[nodiscard]] double first_s() const {
+    return std::max(times_.first_s, std::ceil(times_.horizon_s / times_.every_s) * times_.every_s);
+  }
+  std::vector<Start> starts_of(std::size_t first, const std::vector<double>& instants_s) {
+    const std::size_t robots = views_.size();
+    std::vector<std::vector<FilterBank>> states(models_.size() * robots);  // by model and robot, then by instant
+    pool_.for_each(states.size(), [&](std::size_t i) {
+      FilterBank& bank = models_[i / robots].banks[i % robots];
+      states[i].reserve(instants_s.size());
+      for (const double time_s : instants_s) {
+        bank.advance_to(time_s - times_.horizon_s);
+        states[i].push_back(bank);
+      }
+    });
+    std::vector<Start> starts;
+    for (std::size_t k = 0; k < instants_s.size(); ++k) {
+      std::vector<double> log_likelihood(models_.size(), 0.0);
+      for (std::size_t i = 0; i < states.size(); ++i) log_likelihood[i / robots] += states[i][k].log_likelihood();
+      const RunAmplitude::Between between =
+          models_.size() > 1 ? amplitude_.mean(log_likelihood) : RunAmplitude::Between{};
+      Start& start =
+          starts.emplace_back(Start{instants_s[k], static_cast<std::uint32_t>(first + k), {}, between.part});
+      const auto add = [&](std::size_t m) {
+        std::vector<FilterBank> banks;
+        banks.reserve(robots);
+        for (std::size_t r = 0; r < robots; ++r) banks.push_back(std::move(states[m * robots + r][k]));
+        Known& known =
+            start.known.emplace_back(Known{&models_[m].model, std::move(banks), TrafficGrids(models_[m].model)});
+        known.grids = models_[m].traffic.at(instants_s[k] - times_.horizon_s, known.pointers());
+      };
+      add(between.low);
+      if (between.high != between.low) add(between.high);
+    }
+    return starts;
+  }
+  [[nodiscard]] std::vector<Forecast> forecasts_from(const Start& start) const {
+    std::vector<Forecast> seen = forecasts_by(start.known.front(), start);
+    if (start.known.size() == 1) return seen;
+    const std::vector<Forecast> high = forecasts_by(start.known.back(), start);
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      for (double Forecast::*const number : {&Forecast::x_mm, &Forecast::y_mm, &Forecast::expected_error_mm,
+                                             &Forecast::sample_x_mm, &Forecast::sample_y_mm})
+        seen[i].*number += start.part * (high[i].*number - seen[i].*number);
+    }
+    return seen;
+  }
+  /// By track. NaN: no forecast.
+  [[nodiscard]] std::vector<Forecast> forecasts_by(const Known& known, const Start& start) const {
+    const double from_s = start.time_s - times_.horizon_s;
+    const auto sample_s = [&](const TrackView& view) {
+      const Sample* const near = sample_near(*view.track, start.time_s, kNear * (start.time_s - from_s));
+      return near != nullptr ? near->time_s : std::numeric_limits<double>::quiet_NaN();
+    };
+    const MotionModel& model = *known.model;
+    JointForecast joint(model, known.pointers(), known.grids, from_s, neighbours_, sample_s);
+    joint.advance_to(start.time_s);
+    if (times_.rollouts > 0 && (model.contacts || known.grids.any() || Edges(model).any()))
+      joint.draw_rollouts(from_s, times_.rollouts, all_, {views_.front()->run, start.number});
+    std::vector<Forecast> out;
+    for (std::size_t i = 0; i < known.banks.size(); ++i) {
+      const TrackView& view = *views_[i];
+      Forecast p{view.run, static_cast<std::uint32_t>(view.place), start.time_s, 0, 0, 0};
+      if (!joint.expected(i, p)) p.x_mm = std::nan("");
+      if (known.banks[i].started()) set_start(known.banks[i], p);
+      out.push_back(p);
+    }
+    return out;
+  }
   /// The most likely hypothesis at the start of the horizon.
   static void set_start(const FilterBank& bank, Forecast& to) {
     const auto best = std::max_element(bank.hypotheses().begin(), bank.hypotheses().end(),
@@ -388,65 +485,35 @@ struct RunForecast {
     to.from_y_mm = belief.centre_y_mm();
     to.from_heading_rad = belief.mean[2];
   }
+
+  const std::vector<const TrackView*> views_;
+  const ForecastTimes times_;
+  os::WorkerPool& pool_;
+  const bool all_, neighbours_;
+  const RunAmplitude amplitude_;
+  std::deque<RunModel> models_;
 };
 
 }  // namespace
 
-std::vector<Forecast> forecast(const MotionModel& model, const PreparedSet& set,
-                               const ForecastTimes& forecast_times, Tracks of, std::uint32_t threads) {
-  const std::vector<Run>& runs = set.set().runs;
-  std::vector<std::vector<Forecast>> by_run(runs.size());
-  const bool effects_of_neighbours = looks_at_neighbours(model),
-             neighbours =
-                 effects_of_neighbours || model.contacts || TrafficGrids(model).any() || Edges(model).any();
-  os::in_parallel(runs.size(), threads, [&](std::size_t run) {
+std::vector<Forecast> forecast(const MotionModel& model, const PreparedSet& set, const ForecastTimes& times,
+                               Tracks of, std::uint32_t threads) {
+  const bool neighbours = RunForecasts::needs_neighbours(model);
+  os::WorkerPool pool(threads);
+  std::vector<Forecast> all;
+  for (std::size_t run = 0; run < set.set().runs.size(); ++run) {
     std::vector<const TrackView*> views;
-    double last_s = 0;
     bool wanted = false;
     for (const TrackView& view : set.views()) {
       if (view.run != run) continue;
-      if (!counts(*view.track, of) && !neighbours) continue;
-      wanted = wanted || counts(*view.track, of);
-      views.push_back(&view);
-      last_s = std::max(last_s, end_of(view.track->samples));
+      const bool counted = counts(*view.track, of);
+      wanted = wanted || counted;
+      if (counted || neighbours) views.push_back(&view);
     }
-    if (!wanted) return;
-    const RunAmplitude amplitude(model, views.front()->number);
-    std::deque<RunForecast> run_forecasts;
-    for (const MotionModel& one : amplitude.models()) run_forecasts.emplace_back(one, views, neighbours);
-    const double first_s =
-        std::max(forecast_times.first_s,
-                 std::ceil(forecast_times.horizon_s / forecast_times.every_s) * forecast_times.every_s);
-    for (int k = 0;; ++k) {
-      const double time_s = first_s + k * forecast_times.every_s;
-      if (time_s > last_s + 1e-6) break;
-      const double from_s = time_s - forecast_times.horizon_s;
-      std::vector<double> log_likelihood;
-      for (RunForecast& run_forecast : run_forecasts) {
-        run_forecast.advance_to(from_s);
-        log_likelihood.push_back(run_forecast.log_likelihood());
-      }
-      const RunAmplitude::Between between =
-          run_forecasts.size() > 1 ? amplitude.mean(log_likelihood) : RunAmplitude::Between{};
-      const auto forecast_by = [&](std::size_t i) {
-        return run_forecasts[i].at(from_s, time_s, forecast_times.rollouts, effects_of_neighbours,
-                                   {static_cast<std::uint32_t>(run), static_cast<std::uint32_t>(k)});
-      };
-      std::vector<Forecast> seen = forecast_by(between.low);
-      if (between.high != between.low) {
-        const std::vector<Forecast> high = forecast_by(between.high);
-        for (std::size_t i = 0; i < seen.size(); ++i) {
-          for (double Forecast::*const number : {&Forecast::x_mm, &Forecast::y_mm, &Forecast::expected_error_mm,
-                                                 &Forecast::sample_x_mm, &Forecast::sample_y_mm})
-            seen[i].*number += between.part * (high[i].*number - seen[i].*number);
-        }
-      }
-      for (std::size_t i = 0; i < seen.size(); ++i)
-        if (!std::isnan(seen[i].x_mm) && counts(*views[i]->track, of)) by_run[run].push_back(seen[i]);
-    }
-  });
-  std::vector<Forecast> all;
-  for (const auto& part : by_run) all.insert(all.end(), part.begin(), part.end());
+    if (!wanted) continue;
+    const std::vector<Forecast> of_run = RunForecasts(model, std::move(views), times, pool).forecasts(of);
+    all.insert(all.end(), of_run.begin(), of_run.end());
+  }
   return all;
 }
 

@@ -107,9 +107,10 @@ void Loop::add(Step step, const Radios& radios) {
     step.errors.push_back(compare(test_[q], simulated, train_[q]));
   }
   const std::string shown = fmt::format("{}: {}", step.name, step.evidence);
-  constexpr double kSteps = 11;
+  constexpr int kSteps = 11;
   if (options_.progress) {
-    options_.progress(std::min((1 + static_cast<double>(steps_.size())) / kSteps, 1.0), shown);
+    const double left = std::max(0, kSteps - 2 - static_cast<int>(steps_.size()));
+    options_.progress({fmt::format("after {}", shown), "", 0, 1, {{0, left, left}}});
   } else {
     say(shown);
   }

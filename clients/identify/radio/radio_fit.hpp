@@ -3,9 +3,9 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <string>
 
+#include "core/stats/time_left.hpp"
 #include "idl/identification.pb.h"
 #include "idl/model.pb.h"
 
@@ -18,8 +18,8 @@ struct FitOptions {
   bool swap = false;  ///< exchanges training and held-out half
   int runs = 40;      ///< simulated runs per effect and set
   int swarms = 200;   ///< random swarms of the fitted population
-  /// Receives progress, 0..1, and the result of each effect; none: they are printed.
-  std::function<void(double, const std::string&)> progress = {};
+  /// Receives the result of each effect, as the work that follows it; none: they are printed.
+  stats::WorkReport progress = {};
 };
 
 struct RadioFound {

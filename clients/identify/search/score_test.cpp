@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/os/worker_pool.hpp"
 #include "core/random/random.hpp"
 #include "core/stats/distributions.hpp"
 
@@ -14,6 +15,17 @@ namespace kilotwin::identify {
 namespace {
 
 constexpr std::size_t kFolds = 6;
+
+/// Columns or rows of a matrix that one task computes. A constant, so that no result depends on the number of threads.
+constexpr Eigen::Index kBlock = 128;
+
+/// Calls task(first, count) for blocks of 0..size.
+template <class Task> void in_blocks(Eigen::Index size, std::uint32_t threads, const Task& task) {
+  os::in_parallel(static_cast<std::size_t>((size + kBlock - 1) / kBlock), threads, [&](std::size_t b) {
+    const Eigen::Index first = static_cast<Eigen::Index>(b) * kBlock;
+    task(first, std::min(kBlock, size - first));
+  });
+}
 
 bool of_robots(const Hypothesis& h) {
   return std::find(h.covariates.begin(), h.covariates.end(), "robot") != h.covariates.end();
@@ -95,7 +107,7 @@ ScoreTest::Folds::Folds(std::size_t count, Eigen::Index columns)
 
 ScoreTest::ScoreTest(const Fitter& fitter, const MotionModel& model, const std::vector<Unit>& units,
                      const Dictionary& dictionary)
-    : model_(model), dictionary_(dictionary) {
+    : model_(model), dictionary_(dictionary), threads_(fitter.threads()) {
   const Eigen::Index all = units.front().information.rows();
   own_ = all - dictionary.columns();
   information_ = Eigen::MatrixXd::Zero(all, all);
@@ -106,27 +118,33 @@ ScoreTest::ScoreTest(const Fitter& fitter, const MotionModel& model, const std::
   for (const Unit& unit : units) clusters += unit.cluster_scores.cols();
   clusters_.resize(all, clusters);
   Eigen::Index next = 0;
+  std::vector<std::array<double, kFolds>> shares(units.size());  // of a unit's clusters, by fold
   for (std::size_t u = 0; u < units.size(); ++u) {
-    const std::size_t fold = u % by_unit_.score.size();
-    by_unit_.information[fold] += units[u].information;
-    by_unit_.score[fold] += units[u].score;
+    by_unit_.score[u % by_unit_.score.size()] += units[u].score;
     // Clusters have about equal length and information.
     const Eigen::Index stretches = units[u].cluster_scores.cols();
-    std::array<double, kFolds> share{};
     for (Eigen::Index k = 0; k < stretches; ++k) {
       const std::size_t of = (static_cast<std::size_t>(k) + u) % kFolds;
       by_cluster_.score[of] += units[u].cluster_scores.col(k);
-      share[of] += 1 / static_cast<double>(stretches);
+      shares[u][of] += 1 / static_cast<double>(stretches);
     }
-    for (std::size_t f = 0; f < kFolds; ++f)
-      if (share[f] > 0) by_cluster_.information[f] += share[f] * units[u].information;
-    information_ += units[u].information;
     score_ += units[u].score;
     cluster_unit_.insert(cluster_unit_.end(), static_cast<std::size_t>(units[u].cluster_scores.cols()), u);
     cluster_run_.insert(cluster_run_.end(), units[u].cluster_run.begin(), units[u].cluster_run.end());
     clusters_.middleCols(next, units[u].cluster_scores.cols()) = units[u].cluster_scores;
     next += units[u].cluster_scores.cols();
   }
+  in_blocks(all, threads_, [&](Eigen::Index start, Eigen::Index count) {
+    const auto add = [&](Eigen::MatrixXd& to, double share, const Unit& unit) {
+      to.middleCols(start, count) += share * unit.information.middleCols(start, count);
+    };
+    for (std::size_t u = 0; u < units.size(); ++u) {
+      add(by_unit_.information[u % by_unit_.score.size()], 1, units[u]);
+      add(information_, 1, units[u]);
+      for (std::size_t f = 0; f < kFolds; ++f)
+        if (shares[u][f] > 0) add(by_cluster_.information[f], shares[u][f], units[u]);
+    }
+  });
   // Prior precision of the model's columns.
   Eigen::MatrixXd base = Eigen::MatrixXd::Zero(all, all);
   Eigen::VectorXd from = Eigen::VectorXd::Zero(all);
@@ -249,20 +267,34 @@ Finding ScoreTest::evidence_of_term(int term) const {
   return evidence_of(reduce(columns, term, of_each), own.precision.cwiseInverse().cwiseSqrt(), 0);
 }
 
+std::vector<Finding> ScoreTest::evidence_of_each(const std::vector<const Hypothesis*>& hypotheses,
+                                                 int without_term) const {
+  std::vector<Finding> out(hypotheses.size());
+  os::in_parallel(out.size(), threads_, [&](std::size_t h) { out[h] = evidence_of(*hypotheses[h], without_term); });
+  return out;
+}
+
 /// The whole dictionary at once, reduced by the model.
 ScoreTest::ReducedDictionary ScoreTest::reduced_dictionary() const {
   const Eigen::Index columns = dictionary_.columns();
   Eigen::MatrixXd own = information_.topLeftCorner(own_, own_);
   own.diagonal() += prior_;
   const Eigen::MatrixXd by = own.ldlt().solve(information_.topRightCorner(own_, columns));
-  return {information_.bottomRightCorner(columns, columns) - information_.bottomLeftCorner(columns, own_) * by,
-          clusters_.bottomRows(columns) - by.transpose() * clusters_.topRows(own_),
-          score_.tail(columns) - by.transpose() * score_.head(own_)};
+  ReducedDictionary out{Eigen::MatrixXd(columns, columns), Eigen::MatrixXd(columns, clusters_.cols()),
+                        score_.tail(columns) - by.transpose() * score_.head(own_)};
+  in_blocks(columns, threads_, [&](Eigen::Index first, Eigen::Index count) {
+    out.information.middleCols(first, count) =
+        information_.block(own_, own_ + first, columns, count) -
+        information_.bottomLeftCorner(columns, own_) * by.middleCols(first, count);
+    out.clusters.middleRows(first, count) = clusters_.middleRows(own_ + first, count) -
+                                            by.middleCols(first, count).transpose() * clusters_.topRows(own_);
+  });
+  return out;
 }
 
-/// Tests one hypothesis. Lowers `worst` to its log10 p value under each flip.
+/// Tests one hypothesis. `flips_log10_p` becomes its log10 p value under each flip; it stays if no column has information.
 Finding ScoreTest::finding_of(std::size_t h, const ReducedDictionary& reduced, const Eigen::MatrixXd& flipped,
-                              Eigen::VectorXd& worst) const {
+                              Eigen::VectorXd& flips_log10_p) const {
   const Hypothesis& hypothesis = dictionary_.hypotheses[h];
   const std::vector<Eigen::Index>& columns = hypothesis.columns;
   Finding finding;
@@ -286,29 +318,38 @@ Finding ScoreTest::finding_of(std::size_t h, const ReducedDictionary& reduced, c
   }
   finding.log10_p = stats::log10_chi_squared_tail(finding.statistic / own_dispersion, degrees);
   for (Eigen::Index f = 0; f < kFlips; ++f)
-    worst(f) = std::min(worst(f), stats::log10_chi_squared_tail(statistics[f] / dispersion, degrees));
+    flips_log10_p(f) = stats::log10_chi_squared_tail(statistics[f] / dispersion, degrees);
   return finding;
 }
 
 ScoreTest::Outcome ScoreTest::test(std::uint64_t seed) const {
   const ReducedDictionary reduced = reduced_dictionary();
-  const Eigen::MatrixXd flipped = reduced.clusters * signs(reduced.clusters.cols(), seed);
+  const Eigen::MatrixXd flips = signs(reduced.clusters.cols(), seed);
+  Eigen::MatrixXd flipped(reduced.clusters.rows(), kFlips);
+  in_blocks(flipped.rows(), threads_, [&](Eigen::Index first, Eigen::Index count) {
+    flipped.middleRows(first, count).noalias() = reduced.clusters.middleRows(first, count) * flips;
+  });
   Outcome out;
+  out.findings.resize(dictionary_.hypotheses.size());
+  std::vector<Eigen::VectorXd> log10_p(out.findings.size(), Eigen::VectorXd::Zero(kFlips));
+  os::in_parallel(out.findings.size(), threads_,
+                  [&](std::size_t h) { out.findings[h] = finding_of(h, reduced, flipped, log10_p[h]); });
   Eigen::VectorXd worst = Eigen::VectorXd::Zero(kFlips);
-  for (std::size_t h = 0; h < dictionary_.hypotheses.size(); ++h)
-    out.findings.push_back(finding_of(h, reduced, flipped, worst));
+  for (const Eigen::VectorXd& one : log10_p)
+    for (Eigen::Index f = 0; f < kFlips; ++f) worst(f) = std::min(worst(f), one(f));
   // The minimum over many p values follows a Gumbel distribution on the log scale.
   const double mean = worst.mean();
   const double sd = std::sqrt((worst.array() - mean).square().mean());
   const double gumbel = -std::log(-std::log1p(-kFamilyAlarm));
   out.threshold_log10_p = mean - std::max(sd, 0.4) * std::sqrt(6.0) / M_PI * (gumbel - 0.5772);
-  for (Finding& finding : out.findings) {
-    if (finding.log10_p > out.threshold_log10_p) continue;
-    const Finding result = evidence_of(dictionary_.hypotheses[finding.hypothesis], -1);
+  os::in_parallel(out.findings.size(), threads_, [&](std::size_t h) {
+    Finding& finding = out.findings[h];
+    if (finding.log10_p > out.threshold_log10_p) return;
+    const Finding result = evidence_of(dictionary_.hypotheses[h], -1);
     finding.evidence = result.evidence;
     finding.relative_scale = result.relative_scale;
     finding.held_out = result.held_out;
-  }
+  });
   return out;
 }
 

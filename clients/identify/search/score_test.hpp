@@ -40,6 +40,8 @@ class ScoreTest {
   /// Evidence and cross-validated gain of a hypothesis if one term of the model is removed; below 0: none is
   /// removed.
   [[nodiscard]] Finding evidence_of(const Hypothesis&, int without_term) const;
+  [[nodiscard]] std::vector<Finding> evidence_of_each(const std::vector<const Hypothesis*>&,
+                                                      int without_term) const;
   /// The same for a term of the model itself.
   [[nodiscard]] Finding evidence_of_term(int term) const;
 
@@ -55,12 +57,13 @@ class ScoreTest {
   };
   [[nodiscard]] ReducedDictionary reduced_dictionary() const;
   [[nodiscard]] Finding finding_of(std::size_t hypothesis, const ReducedDictionary&, const Eigen::MatrixXd& flipped,
-                                   Eigen::VectorXd& worst) const;
+                                   Eigen::VectorXd& flips_log10_p) const;
   [[nodiscard]] Reduced reduce(const std::vector<Eigen::Index>& columns, int without_term, bool by_cluster) const;
   [[nodiscard]] Finding evidence_of(const Reduced&, const Eigen::VectorXd& scale, double log_choices) const;
 
   const MotionModel& model_;
   const Dictionary& dictionary_;
+  std::uint32_t threads_;
   Eigen::Index own_;  ///< number of columns of base parameters and terms
   Eigen::MatrixXd information_;
   Eigen::VectorXd score_;

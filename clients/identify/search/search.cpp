@@ -23,9 +23,8 @@
 namespace kilotwin::identify {
 namespace {
 
-/// Limits of a search: accepted changes without general terms, hypotheses that failed after their refit, and work
-/// (PreparedSet::work). A set of 24 robots, 3 runs and 300 s stays far below the last one.
-constexpr int kMostRounds = 7, kMostFailed = 20;
+/// Limits of a search: hypotheses that failed after their refit, general terms, and work (PreparedSet::work). A set of 24 robots, 3 runs and 300 s stays far below the last one.
+constexpr int kMostFailed = 20, kMostGeneral = 3;
 constexpr std::uint64_t kMostWork = 3'000'000'000;
 /// Hypotheses with more alternatives (as a logarithm) than this, single steps and pulses, are no alternatives in
 /// an exchange.
@@ -45,7 +44,6 @@ constexpr double kRemnant = 0.003;
 constexpr std::size_t kEnoughSamples = 130000;
 /// The same for general terms, which have more columns.
 constexpr std::size_t kEnoughForGeneral = 70000;
-constexpr int kMostGeneral = 3;
 /// General terms that are tried in one round.
 constexpr std::size_t kMostTries = 4;
 /// Key of a general term among the failed hypotheses.
@@ -55,10 +53,10 @@ constexpr const char* kWave = "wave";
 
 class Loop {
  public:
-  Loop(const Fitter& fitter, const FitState& base, const std::function<void(double, const std::string&)>& progress,
+  Loop(const Fitter& fitter, const FitState& base, const WorkLog& log,
        const std::function<bool(const FitState&)>& leaves_much)
       : fitter_(fitter),
-        progress_(progress),
+        log_(log),
         leaves_much_(leaves_much),
         extent_(extent_of(base.tracks)),
         out_{base, {}, {{base, {}}}, {}, {}, {}, {}} {
@@ -70,10 +68,7 @@ class Loop {
       ++round_;
       note_stage();
     }
-    for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t) {
-      say("simplifying shapes", static_cast<double>(t) / static_cast<double>(out_.fit.model.terms.size()));
-      simplify(fitter_, out_.fit, t);
-    }
+    for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t) simplify(fitter_, out_.fit, t);
     out_.work = out_.fit.tracks.work();
     return std::move(out_);
   }
@@ -82,7 +77,7 @@ class Loop {
   /// Makes one change of the model: an addition, or at a limit and when nothing passes a removal or an exchange. Returns false
   /// if there is none.
   bool changed() {
-    say("testing hypotheses", 0);
+    say(kTest, "testing hypotheses");
     if (limit().empty() && accept_calibration_shifts()) return true;
     score_dictionary();
     const ScoreTest::Outcome outcome = score_test_->test(kSeed + static_cast<std::uint64_t>(round_));
@@ -96,7 +91,7 @@ class Loop {
       if (!std::exchange(waves_tried, true) && accept_wave(best->evidence)) return true;
       if (accepted(*best, outcome)) return true;
     }
-    say("testing alternatives", 0.5);
+    say(kAlternatives, "testing alternatives");
     return eliminate() || accept_general();
   }
   /// The limit that the search has reached, in one sentence; empty: none. It then adds nothing more.
@@ -119,6 +114,7 @@ class Loop {
     constexpr double kLeastRise = 3;
     const Search before = out_;
     const std::string name = hypothesis(best).name;
+    say(kAddition, "fitting " + name);
     const double likelihood = fitter_.log_likelihood_of_all(out_.fit);
     note_ambiguous(best, outcome);
     if (replaced_by_alternative(name)) return true;
@@ -131,7 +127,6 @@ class Loop {
       ++failures_;
       return false;
     }
-    say("backward elimination", 0.6);
     eliminate_earlier();
     fitter_.fit_contacts(out_.fit);
     try_camera_motion();
@@ -144,12 +139,13 @@ class Loop {
     for (std::size_t t = out_.fit.model.terms.size(); t-- > 0;) removed(t, false);
   }
   void note_stage() { out_.path.push_back({out_.fit, out_.reasons}); }
-  /// `part`: the share of the present round that is done.
-  void say(const char* doing, double part) const {
-    std::string text = doing;
-    for (const Term& term : out_.fit.model.terms)
-      text += (&term == &out_.fit.model.terms.front() ? "; accepted: " : ", ") + term.name;
-    progress_(std::min(0.95, 0.9 * (round_ + part) / kMostRounds), text);
+  void say(WorkKind kind, std::string activity) const {
+    const std::vector<Term>& terms = out_.fit.model.terms;
+    for (const Term& term : terms) activity += (&term == &terms.front() ? "; accepted: " : ", ") + term.name;
+    const int adds = kind == kAddition ? 1 : 0;
+    log_.begin(kind, fmt::format("search, round {}", round_ + 1), activity,
+               terms.size() + static_cast<std::size_t>(adds),
+               limit().empty() ? std::max(0, kMostRounds + 2 * general_terms_ - round_ - adds) : 0);
   }
   /// The tracks of the test. A large set: every n-th unit.
   [[nodiscard]] std::vector<std::vector<const TrackView*>> tested_units(
@@ -265,7 +261,6 @@ class Loop {
     out_.steps.push_back({one.term.name, one.reason.finding.held_out});
     out_.fit.model.terms.push_back(std::move(one.term));
     out_.reasons.push_back(std::move(one.reason));
-    say("fitting", 0.3);
     fitter_.fit(out_.fit, 2);
     refine_shape(out_.fit.model.terms.size() - 1);
     fitter_.fit_contacts(out_.fit);
@@ -291,13 +286,14 @@ class Loop {
                             std::abs(numbers[1]) * (extent_.y_high_mm - extent_.y_low_mm)) /
                            (2 * M_PI);
     if (periods < kFewestPeriods && stripes < kFewestStripes) return false;
+    say(kAddition, "fitting " + wave.term.name);
     return fits(std::move(wave), kWave);
   }
   /// Adds the general term with the most evidence that fits, if much is left unexplained. Returns whether there is one.
   bool accept_general() {
-    if (general_terms_ == kMostGeneral || !limit().empty() || !leaves_much_ || !leaves_much_(out_.fit))
-      return false;
-    say("testing general terms", 0.7);
+    if (general_terms_ == kMostGeneral || !limit().empty() || !leaves_much_) return false;
+    say(kGeneralTerms, "testing general terms");
+    if (!leaves_much_(out_.fit)) return false;
     for (GeneralTerm& one : general_candidates()) {
       if (worked_out()) break;
       const std::string key = kGeneral + one.term.name;
@@ -373,7 +369,6 @@ class Loop {
     }
     out_.fit.model.terms.push_back(std::move(term));
     out_.reasons.push_back(reason);
-    say("fitting", 0.3);
     fitter_.fit(out_.fit, 2);
     out_.steps.push_back({h.name, found.held_out});
     if (!merged()) refine_shape(out_.fit.model.terms.size() - 1);
@@ -384,7 +379,6 @@ class Loop {
     constexpr double kMost = 0.5;
     const Search before = out_;
     const double likelihood = fitter_.log_likelihood(out_.fit);
-    say("fitting", 0.3);
     refine_shape(place);
     if (fitter_.log_likelihood(out_.fit) > likelihood + kMost * expected_gain) return true;
     out_ = before;
@@ -459,17 +453,19 @@ class Loop {
       const auto place = static_cast<std::size_t>(t);
       const Finding own = score_test_->evidence_of_term(t);
       if (own.held_out < 2 && removed(place, false)) return true;
-      const Hypothesis* best = nullptr;
-      Finding best_finding;
+      std::vector<const Hypothesis*> others;
       for (const Hypothesis& h : dictionary_.hypotheses) {
         if (h.log_choices > kManyChoices && h.name != out_.fit.model.terms[place].name) continue;
         // Amplitudes of this term's curve are no alternative: they contain the curve.
-        if (multiplies_known_curve(dictionary_.term_of(h, 1))) continue;
-        const Finding other = score_test_->evidence_of(h, t);
-        if (best == nullptr || other.evidence > best_finding.evidence) {
-          best = &h;
-          best_finding = other;
-        }
+        if (!multiplies_known_curve(dictionary_.term_of(h, 1))) others.push_back(&h);
+      }
+      const std::vector<Finding> findings = score_test_->evidence_of_each(others, t);
+      const Hypothesis* best = nullptr;
+      Finding best_finding;
+      for (std::size_t h = 0; h < others.size(); ++h) {
+        if (best != nullptr && findings[h].evidence <= best_finding.evidence) continue;
+        best = others[h];
+        best_finding = findings[h];
       }
       if (best == nullptr || best->name == out_.fit.model.terms[place].name ||
           best_finding.evidence <= own.evidence + std::max(kClose, kRemnant * own.evidence) ||
@@ -570,7 +566,6 @@ class Loop {
     out_ = *alternatives_.before;
     out_.fit.model.terms.push_back(term);
     out_.reasons.push_back(reason);
-    say("fitting", 0.3);
     fitter_.fit(out_.fit, 2);
     refine_shape(out_.fit.model.terms.size() - 1);
     fitter_.fit_contacts(out_.fit);
@@ -606,7 +601,7 @@ class Loop {
   }
 
   const Fitter& fitter_;
-  const std::function<void(double, const std::string&)>& progress_;
+  const WorkLog& log_;
   const std::function<bool(const FitState&)>& leaves_much_;
   std::vector<Dictionary> general_;  ///< empty: not needed yet
   int general_terms_ = 0;
@@ -629,10 +624,9 @@ class Loop {
 
 }  // namespace
 
-Search search(const Fitter& fitter, const FitState& base,
-              const std::function<void(double, const std::string&)>& progress,
+Search search(const Fitter& fitter, const FitState& base, const WorkLog& log,
               const std::function<bool(const FitState&)>& leaves_much) {
-  return Loop(fitter, base, progress, leaves_much).run();
+  return Loop(fitter, base, log, leaves_much).run();
 }
 
 }  // namespace kilotwin::identify

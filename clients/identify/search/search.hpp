@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "clients/identify/search/score_test.hpp"
+#include "clients/identify/search/work.hpp"
 
 namespace kilotwin::identify {
 
@@ -59,10 +60,12 @@ struct Search {
   std::uint64_t work = 0;  ///< PreparedSet::work at its end
 };
 
-/// Starts from a fitted base model. `progress` gets 0..1 and the present step. `leaves_much`: whether a model leaves a
+/// Limit of a search: accepted changes without general terms. Each of these allows two more.
+inline constexpr int kMostRounds = 7;
+
+/// Starts from a fitted base model. `leaves_much`: whether a model leaves a
 /// large systematic error of the data of the fit; only then general terms are tested, those without a named form.
-[[nodiscard]] Search search(const Fitter&, const FitState& base,
-                            const std::function<void(double, const std::string&)>& progress,
+[[nodiscard]] Search search(const Fitter&, const FitState& base, const WorkLog&,
                             const std::function<bool(const FitState&)>& leaves_much = {});
 
 }  // namespace kilotwin::identify

@@ -42,16 +42,17 @@ Eigen::MatrixX2f errors_of(const std::vector<Window>& windows, bool in_body) {
 }
 
 /// Errors of `judged` after subtraction of what a learner of `known` predicts.
-Eigen::MatrixX2f left_of(const std::vector<Window>& known, const std::vector<Window>& judged, bool in_body) {
-  const RandomForest learner(covariates_of(known), errors_of(known, in_body));
+Eigen::MatrixX2f left_of(const std::vector<Window>& known, const std::vector<Window>& judged, bool in_body,
+                         std::uint32_t threads) {
+  const RandomForest learner(covariates_of(known), errors_of(known, in_body), threads);
   return errors_of(judged, in_body) - learner.predict(covariates_of(judged));
 }
 
 /// Whether errors ahead and to the left are easier to learn than those along x and y: half of the tracks from the rest.
-bool body_is_better(const std::vector<Window>& known) {
+bool body_is_better(const std::vector<Window>& known, std::uint32_t threads) {
   const std::vector<Window> first = part_of(known, 2, 0, true), second = part_of(known, 2, 0, false);
   if (std::min(first.size(), second.size()) < kFewestKnown / 2) return true;
-  return left_of(first, second, true).squaredNorm() < left_of(first, second, false).squaredNorm();
+  return left_of(first, second, true, threads).squaredNorm() < left_of(first, second, false, threads).squaredNorm();
 }
 
 void add(PredictionErrors& to, const Window& w, double square_mm2) {
@@ -80,14 +81,15 @@ std::vector<Window> part_of(const std::vector<Window>& all, std::size_t folds, s
 }
 
 std::optional<LearnerCheck> learner_check(const MeasuredSet& set, const std::vector<Window>& known,
-                                          const std::vector<Window>& held_out, const Stretches& stretches) {
+                                          const std::vector<Window>& held_out, std::uint32_t threads,
+                                          const Stretches& stretches) {
   const bool cross_validated = held_out.empty();
   if (known.size() < kFewestKnown || (!cross_validated && held_out.size() < kFewestHeldOut)) return std::nullopt;
-  const bool in_body = body_is_better(known);
+  const bool in_body = body_is_better(known, threads);
   PredictionErrors with, without;
   std::map<std::pair<std::uint32_t, double>, Stretch> by_time;  ///< by run and number of the stretch
   const auto judge = [&](const std::vector<Window>& from, const std::vector<Window>& judged) {
-    const Eigen::MatrixX2f left = left_of(from, judged, in_body);
+    const Eigen::MatrixX2f left = left_of(from, judged, in_body, threads);
     for (std::size_t i = 0; i < judged.size(); ++i) {
       const double before_mm2 = judged[i].in_world_mm.squaredNorm(),
                    after_mm2 = static_cast<double>(left.row(static_cast<Eigen::Index>(i)).squaredNorm());

@@ -31,7 +31,8 @@ struct Stretches {
 /// enough stretches: a bootstrap over stretches. Else it concerns other robots: a bootstrap over robots and runs. Nothing:
 /// too few windows.
 [[nodiscard]] std::optional<LearnerCheck> learner_check(const MeasuredSet&, const std::vector<Window>& known,
-                                                        const std::vector<Window>& held_out, const Stretches& = {});
+                                                        const std::vector<Window>& held_out, std::uint32_t threads,
+                                                        const Stretches& = {});
 
 /// Windows of the tracks with this remainder, or of all others.
 [[nodiscard]] std::vector<Window> part_of(const std::vector<Window>& all, std::size_t folds, std::size_t fold,

@@ -114,22 +114,22 @@ std::string words_of(const Unexplained& u, const std::optional<ErrorBounds>& bou
 }  // namespace
 
 bool leaves_systematic_error(const MeasuredSet& set, const std::vector<Window>& known,
-                             const PredictionErrors& errors) {
+                             const PredictionErrors& errors, std::uint32_t threads) {
   if (errors.rows == 0) return false;
   if (errors.rmse_mm() > kBeyond * errors.expected_mm()) return true;
-  const std::optional<LearnerCheck> learner = learner_check(set, known, {});
+  const std::optional<LearnerCheck> learner = learner_check(set, known, {}, threads);
   return learner && learner->predicted_mm() > 0;
 }
 
 Unexplained find_unexplained(const MeasuredSet& set, const std::vector<Window>& known,
                              const std::vector<Window>& held_out, const PredictionErrors& errors,
                              const std::optional<ErrorBounds>& bounds, const std::optional<Replicates>& replicates,
-                             const Stretches& stretches) {
+                             std::uint32_t threads, const Stretches& stretches) {
   Unexplained u;
   u.error_mm = errors.rmse_mm();
   u.expected_mm = errors.expected_mm();
   if (replicates) u.repetitions_mm = replicates->floor_mm;
-  u.learner = learner_check(set, known, held_out, stretches);
+  u.learner = learner_check(set, known, held_out, threads, stretches);
   const Gap gap = largest_gap(u, bounds);
   u.systematic_mm = gap.systematic_mm;
   if (u.large()) {

@@ -33,10 +33,11 @@ struct Unexplained {
 [[nodiscard]] Unexplained find_unexplained(const MeasuredSet& set, const std::vector<Window>& known,
                                            const std::vector<Window>& held_out, const PredictionErrors& errors,
                                            const std::optional<ErrorBounds>& bounds,
-                                           const std::optional<Replicates>& replicates, const Stretches& = {});
+                                           const std::optional<Replicates>& replicates, std::uint32_t threads,
+                                           const Stretches& = {});
 
 /// Whether a model leaves a systematic error of the data of its own fit: `known` are its windows, `errors` its errors there.
 [[nodiscard]] bool leaves_systematic_error(const MeasuredSet&, const std::vector<Window>& known,
-                                           const PredictionErrors& errors);
+                                           const PredictionErrors& errors, std::uint32_t threads);
 
 }  // namespace kilotwin::identify

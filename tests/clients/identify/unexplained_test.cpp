@@ -72,7 +72,7 @@ PredictionErrors errors_by_track(const std::vector<Window>& windows, double expe
 Unexplained unexplained_in(const Sets& sets, double expected_mm, const std::optional<Replicates>& replicates = {}) {
   const PredictionErrors errors = errors_by_track(sets.held_out, expected_mm);
   return find_unexplained(sets.set, sets.known, sets.held_out, errors, bounds_of(sets.set, errors, errors),
-                          replicates);
+                          replicates, 2);
 }
 
 TEST(Unexplained, NothingIsFoundInNoise) {
@@ -140,7 +140,7 @@ TEST(Unexplained, SaysWhatWasComparedAndWhatWasNot) {
   const PredictionErrors errors = errors_by_track(sets.held_out, 3.5);
   const auto words = [&](const std::vector<Window>& held_out, const PredictionErrors& of,
                          const std::optional<ErrorBounds>& bounds) {
-    const Unexplained u = find_unexplained(sets.set, sets.known, held_out, of, bounds, {});
+    const Unexplained u = find_unexplained(sets.set, sets.known, held_out, of, bounds, {}, 2);
     EXPECT_FALSE(u.large());
     return u.in_words;
   };
