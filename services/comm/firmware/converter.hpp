@@ -1,5 +1,5 @@
 /// The analogue-to-digital converter of libsimavr's ATmega328P, for FastCore: what a program does for each reading of a sensor,
-/// without libsimavr's signals. Registers, timers and results are the same in every bit. Whatever is rare is left to libsimavr:
+/// without libsimavr's signals. Registers, timers and results are the same in every bit. Rare cases are left to libsimavr:
 /// the first conversion, interrupts at a conversion's end, free running.
 #pragma once
 
@@ -43,7 +43,7 @@ class Converter {
 
   avr_adc_t* converter_ = nullptr;
   std::function<void()> sample_;
-  /// What libsimavr calls at a conversion's end.
+  /// libsimavr's function for a conversion's end.
   std::uint64_t (*end_)(avr_t*, std::uint64_t, void*) = nullptr;
 };
 
