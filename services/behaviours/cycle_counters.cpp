@@ -3,16 +3,20 @@
 #include <algorithm>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/base/error.hpp"
 #include "services/behaviours/assembly.hpp"
+#include "services/behaviours/constant_division.hpp"
 #include "services/behaviours/runtime/image_abi.h"
 
 namespace kilotwin::behaviours {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
+/// Straight code gets a test after this many cycles of the robot, and after each call.
+constexpr unsigned kMostCyclesWithoutTest = 64;
 
 /// Properties of a strongly connected component of the control-flow graph.
 struct Component {
@@ -182,29 +186,53 @@ class Instrumenter {
     unsigned kind = 0;  ///< KT_CHECK_*
   };
 
+  [[nodiscard]] unsigned cycles_of(const FlowGraph::Block& block, std::uint32_t i) const {
+    const std::span<const Statement> code(statements_.data() + block.first, block.last - block.first);
+    const auto division = constant_division_cycles(code, i - block.first);
+    return division ? *division : avr_cycles(statements_[i].name, statements_[i].operands);
+  }
+
+  /// Adds a counter of block `b`. The block's own, number `first`, stands where the flags are dead, and tests where it must.
+  void add(std::uint32_t b, Counter counter, std::size_t first) {
+    const FlowGraph::Block& block = graph_.blocks[b];
+    if (counters_.size() == first && !counter.tests) {
+      counter.tests = cycles_.closes[b] || (block.is_function && function_calls(b));
+      if (counter.cycles == 0 && !counter.tests) return;
+      const std::optional<std::uint32_t> place = place_in(b, dead_flags(b));
+      if (!place && !counter.tests) return;
+      counter.before = place ? *place : first_instruction(block);
+      counter.keeps_flags = !place;
+    }
+    if (counter.before == block.last) return;  // the block has no instruction
+    const Component& component = cycles_.components[cycles_.component_of[b]];
+    if (!component.is_cycle || component.reads) counter.kind |= KT_CHECK_WAITS;
+    if (component.is_cycle && !component.can_leave && !component.calls) counter.kind |= KT_CHECK_ENDLESS;
+    if (function_uses_vectors(b)) counter.kind |= KT_CHECK_VECTORS;
+    counters_.push_back(counter);
+  }
+
   void plan() {
     for (std::uint32_t b = 0; b < graph_.blocks.size(); ++b) {
       const FlowGraph::Block& block = graph_.blocks[b];
+      const std::vector<bool> flags_are_dead = dead_flags(b);
+      const std::optional<std::uint32_t> place = place_in(b, flags_are_dead);
       Counter counter;
-      bool calls = false;
+      bool after_call = false;
+      const std::size_t first = counters_.size();
       for (std::uint32_t i = block.first; i < block.last; ++i) {
         const Statement& s = statements_[i];
         if (s.kind != Statement::Kind::kInstruction) continue;
-        if (counted_ == Counted::kAll) counter.cycles += avr_cycles(s.name, s.operands);
-        calls = calls || flow_of(s) == Flow::kCall;
+        // On a robot an interrupt comes at any place. Here it comes at tests, so long straight code has more than one.
+        if (counted_ == Counted::kAll && place && i > *place && flags_are_dead[i - block.first] &&
+            (after_call || counter.cycles >= kMostCyclesWithoutTest)) {
+          add(b, counter, first);
+          counter = {.before = i, .tests = true};
+          after_call = false;
+        }
+        if (counted_ == Counted::kAll) counter.cycles += cycles_of(block, i);
+        after_call = after_call || flow_of(s) == Flow::kCall;
       }
-      counter.tests = cycles_.closes[b] || (block.is_function && function_calls(b));
-      if (counter.cycles == 0 && !counter.tests) continue;
-      const std::optional<std::uint32_t> place = place_in(b);
-      if (!place && !counter.tests) continue;
-      counter.before = place ? *place : first_instruction(block);
-      counter.keeps_flags = !place;
-      if (counter.before == block.last) continue;  // the block has no instruction
-      const Component& component = cycles_.components[cycles_.component_of[b]];
-      if (!component.is_cycle || component.reads) counter.kind |= KT_CHECK_WAITS;
-      if (component.is_cycle && !component.can_leave && !component.calls) counter.kind |= KT_CHECK_ENDLESS;
-      if (function_uses_vectors(b)) counter.kind |= KT_CHECK_VECTORS;
-      counters_.push_back(counter);
+      add(b, counter, first);
     }
     verify();
   }
@@ -230,19 +258,26 @@ class Instrumenter {
     return i;
   }
 
-  /// The first instruction of a block before which the flags are dead.
-  [[nodiscard]] std::optional<std::uint32_t> place_in(std::uint32_t b) const {
+  /// Per statement of a block: whether the flags are dead before it.
+  [[nodiscard]] std::vector<bool> dead_flags(std::uint32_t b) const {
     const FlowGraph::Block& block = graph_.blocks[b];
     bool needed =
         std::any_of(block.next.begin(), block.next.end(), [&](std::uint32_t to) { return needs_flags_[to]; });
-    std::optional<std::uint32_t> first;
+    std::vector<bool> dead(block.last - block.first, false);
     for (std::uint32_t i = block.last; i-- > block.first;) {
       const Statement& s = statements_[i];
       if (s.kind != Statement::Kind::kInstruction) continue;
       needed = reads_flags(s.name) || (needed && !overwrites_flags(s.name));
-      if (!needed) first = i;
+      dead[i - block.first] = !needed;
     }
-    return first;
+    return dead;
+  }
+
+  /// The first instruction of a block before which the flags are dead.
+  [[nodiscard]] std::optional<std::uint32_t> place_in(std::uint32_t b, const std::vector<bool>& dead) const {
+    const auto found = std::find(dead.begin(), dead.end(), true);
+    if (found == dead.end()) return std::nullopt;
+    return graph_.blocks[b].first + static_cast<std::uint32_t>(found - dead.begin());
   }
 
   /// Properties of the function that contains a block. A function extends to the start of the next one.

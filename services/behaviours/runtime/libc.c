@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "budget.h"
 #include "weak.h"
 
 _Noreturn void kilotwin_end(void);
@@ -244,6 +245,8 @@ long long llabs(long long value) { return value < 0 ? -value : value; }
 
 /* The generator of Park and Miller in Schrage's form, as in avr-libc: a state of 0 stands for 123459876. */
 static int32_t next_random(int32_t* state) {
+  enum { LONG_DIVISION_CYCLES = 410 }; /* what its division takes longer than that of an int, which is counted */
+  charge(LONG_DIVISION_CYCLES);
   int32_t x = *state == 0 ? 123459876 : *state;
   x = 16807 * (x % 127773) - 2836 * (x / 127773);
   if (x < 0) x += 0x7fffffff;

@@ -74,6 +74,11 @@ enum Kind : std::uint8_t {
   kReadRegister,
   kWriteDirections,
   kReadFlags,
+  kWriteFlags,
+  kEnableInterrupts,
+  kWriteStackPointer,
+  kReadConverter,
+  kWriteConverter,
   kDelayBySbiw,
   kPoll
 };
@@ -99,8 +104,9 @@ bool is_long(std::uint32_t opcode) {
 
 }  // namespace
 
-FastCore::FastCore(const avr_t& avr)
-    : flash_(avr.flash), operations_(std::make_unique<std::array<Operation, kFlashOctets / 2>>()) {
+FastCore::FastCore(const avr_t& avr, const Converter* converter)
+    : flash_(avr.flash), converter_(converter), operations_(std::make_unique<Operations>()) {
+  operations_->back().kind = kLibsimavrs;
   for (std::uint32_t address = kRegisters; address < kRam; ++address) {
     const auto& one = avr.io[address - kRegisters];
     const bool plain = one.r.c == nullptr && (one.irq == nullptr || address == kAdcsra) && address != kSreg;
@@ -185,7 +191,12 @@ FastCore::Operation FastCore::decode(std::uint32_t pc) const {
     case 0xb: {
       const std::uint32_t address = (o >> 5 & 0x30) + (o & 15) + 32;
       const bool directions = is_direction(address);
-      if ((o & 0x0800) != 0) return directions ? Operation{kWriteDirections, d5, 0, 1, address} : other;
+      if ((o & 0x0800) != 0) {
+        if (directions) return {kWriteDirections, d5, 0, 1, address};
+        if (address == kSreg) return {kWriteFlags, d5, 0, 1, 0};
+        const bool is_stack_pointer = (address == kSpl || address == kSph) && plain_[address];
+        return is_stack_pointer ? Operation{kWriteStackPointer, d5, 0, 1, address} : other;
+      }
       if (directions || plain_[address]) return {kReadRegister, d5, 0, 1, address};
       return address == kSreg ? Operation{kReadFlags, d5, 0, 1, 0} : other;
     }
@@ -226,6 +237,7 @@ FastCore::Operation FastCore::decode(std::uint32_t pc) const {
   if ((o & 0x0e00) == 0x0000) {
     switch (o & 15) {
       case 0x0: {
+        if (converter_ != nullptr && Converter::is_result(address())) return {kReadConverter, d5, 0, 2, address()};
         if (!readable(address())) return other;
         // A poll: LDS, SBRC or SBRS of a bit of it, and RJMP back. In its `r`: the bit, and its value that goes on polling << 3.
         const std::uint32_t skips = next + 6 < kFlashOctets ? word(next + 2) : 0;
@@ -248,7 +260,10 @@ FastCore::Operation FastCore::decode(std::uint32_t pc) const {
   }
   if ((o & 0x0e00) == 0x0200) {
     switch (o & 15) {
-      case 0x0: return in_ram(address()) ? Operation{kSts, d5, 0, 2, address()} : other;
+      case 0x0:
+        if (converter_ != nullptr && Converter::is_control(address()))
+          return {kWriteConverter, d5, 0, 2, address()};
+        return in_ram(address()) ? Operation{kSts, d5, 0, 2, address()} : other;
       case 0x1: return {kStIncrement, d5, kZ, 1, 0};
       case 0x2: return {kStDecrement, d5, kZ, 1, 0};
       case 0x9: return {kStIncrement, d5, kY, 1, 0};
@@ -278,8 +293,8 @@ FastCore::Operation FastCore::decode(std::uint32_t pc) const {
   }
   if ((o & 0xff0f) == 0x9408) {
     const auto flag = static_cast<std::uint8_t>(o >> 4 & 7);
-    // SEI concerns interrupts that wait. While this core runs, none waits: to it CLI is a flag like others.
-    if (flag == S_I && (o & 0x80) == 0) return other;
+    // While this core runs no interrupt waits, so to it CLI is a flag like others.
+    if (flag == S_I && (o & 0x80) == 0) return {kEnableInterrupts, 0, 0, 1, 0};
     return {(o & 0x80) != 0 ? kClearFlag : kSetFlag, flag, 0, 1, 0};
   }
   switch (o) {
@@ -292,32 +307,34 @@ FastCore::Operation FastCore::decode(std::uint32_t pc) const {
 }
 
 // NOLINTNEXTLINE(readability-function-size): one switch over the instruction set
-std::uint64_t FastCore::run(avr_t& avr, std::uint64_t cycles) {
+FastCore::Run FastCore::run(avr_t& avr, std::uint64_t cycles) {
   if (waiting_.loop) {
-    if (inputs_are(avr, waiting_.loop->begin)) return skip(avr, cycles);
+    if (inputs_are(avr, waiting_.loop->begin)) return {skip(avr, cycles), cycles};
     interrupt(avr);
   }
   if (anchor_.pc != kNowhere && !inputs_are(avr, anchor_.memory)) forget_anchor();
-  const std::uint64_t passed = execute<true>(avr, cycles);
-  return waiting_.loop && passed < cycles ? passed + skip(avr, cycles - passed) : passed;
+  Run run = execute<true>(avr, cycles);
+  if (waiting_.loop && run.passed < run.due) run.passed += skip(avr, run.due - run.passed);
+  return run;
 }
 
-/// Whether the program is back at the anchor's state, after a backward jump to `pc`; flags and data are in `avr`.
-bool FastCore::is_back(const avr_t& avr, std::uint32_t pc, std::uint64_t cycle) {
+/// Whether the program is back at the anchor's state, after a backward jump to its place; flags and data are in `avr`.
+bool FastCore::is_back(const avr_t& avr) const {
   const auto equal = [&](std::uint32_t from, std::uint32_t to) {
     return std::memcmp(avr.data + from, anchor_.memory.data.data() + from, to - from) == 0;
   };
-  if (pc == anchor_.pc && equal(0, kRegisters) && equal(kSpl, kSreg + 1) && equal(kRam, kRamEnd + 1) &&
-      std::memcmp(avr.sreg, anchor_.memory.flags.data(), anchor_.memory.flags.size()) == 0)
-    return cycle - anchor_.cycle <= kLongestLoop;
-  if (++anchor_.jumps < anchor_.patience) return false;
+  return equal(0, kRegisters) && equal(kSpl, kSreg + 1) && equal(kRam, kRamEnd + 1) &&
+         std::memcmp(avr.sreg, anchor_.memory.flags.data(), anchor_.memory.flags.size()) == 0;
+}
+
+/// The present state becomes the anchor.
+void FastCore::set_anchor(const avr_t& avr, std::uint32_t pc, std::uint64_t cycle) {
   anchor_.pc = pc;
   anchor_.cycle = cycle;
   anchor_.jumps = 0;
   anchor_.patience = anchor_.patience < kMostPatience ? 2 * anchor_.patience : kFirstPatience;
   std::memcpy(anchor_.memory.data.data(), avr.data, anchor_.memory.data.size());
   std::memcpy(anchor_.memory.flags.data(), avr.sreg, anchor_.memory.flags.size());
-  return false;
 }
 
 /// Executes a loop once, one instruction at a time, to find where its instructions begin. It leaves the state as it was.
@@ -326,7 +343,7 @@ void FastCore::enter_loop(avr_t& avr, std::uint32_t period) {
   loop->begin = anchor_.memory;
   loop->to_boundary.reserve(period);
   while (loop->to_boundary.size() < period) {
-    const std::uint64_t took = execute<false>(avr, 1);
+    const std::uint64_t took = execute<false>(avr, 1).passed;
     for (std::uint64_t left = took; left > 0; --left)
       loop->to_boundary.push_back(static_cast<std::uint8_t>(left == took ? 0 : left));
   }
@@ -369,11 +386,45 @@ void FastCore::rewind() {
   forget_anchor();
 }
 
+namespace {
+
+/// The flags as libsimavr has them: an octet each, 0 or 1, from C to I.
+using Flags = std::uint64_t;
+constexpr Flags flag(int which) { return Flags{1} << (8 * which); }
+constexpr Flags kCarry = flag(S_C), kZero = flag(S_Z), kNegative = flag(S_N), kOverflow = flag(S_V),
+                kSign = flag(S_S), kHalfCarry = flag(S_H), kTransfer = flag(S_T), kInterrupts = flag(S_I);
+constexpr Flags kOfResult = kZero | kNegative | kOverflow | kSign;
+constexpr Flags kOfArithmetic = kOfResult | kCarry | kHalfCarry;
+
+constexpr std::uint8_t as_octet(Flags flags) {
+  return static_cast<std::uint8_t>(flags * 0x0102040810204080u >> 56);
+}
+
+/// Per octet: the flags as a word, and those that tell zero and sign of a result without overflow.
+struct FlagTables {
+  std::array<Flags, 256> spread{}, of_result{};
+};
+constexpr FlagTables make_tables() {
+  FlagTables tables;
+  for (unsigned octet = 0; octet < 256; ++octet) {
+    for (int i = 0; i < 8; ++i) tables.spread[octet] |= (octet >> i & 1) != 0 ? flag(i) : 0;
+    tables.of_result[octet] = (octet == 0 ? kZero : 0) | (octet >= 0x80 ? kNegative | kSign : 0);
+  }
+  return tables;
+}
+constexpr FlagTables kTables = make_tables();
+
+/// Overflow changes two flags: the sign is that of the true result.
+constexpr Flags overflow(std::uint32_t bit) { return (kOverflow | kSign) * bit; }
+
+}  // namespace
+
 /// As run(), without skipping. With kSeeksLoops it ends where it finds a loop.
-template <bool kSeeksLoops> std::uint64_t FastCore::execute(avr_t& avr, std::uint64_t cycles) {
+template <bool kSeeksLoops> FastCore::Run FastCore::execute(avr_t& avr, std::uint64_t cycles) {
   std::uint8_t* const data = avr.data;
-  std::uint8_t* const flag = avr.sreg;
   Operation* const operations = operations_->data();
+  Flags flags = 0;
+  std::memcpy(&flags, avr.sreg, sizeof flags);
   std::uint32_t pc = avr.pc;
   std::uint64_t passed = 0;
   const auto is_ram = [](std::uint32_t address) { return address >= kRam && address <= kRamEnd; };
@@ -382,62 +433,64 @@ template <bool kSeeksLoops> std::uint64_t FastCore::execute(avr_t& avr, std::uin
     data[i] = static_cast<std::uint8_t>(value);
     data[i + 1] = static_cast<std::uint8_t>(value >> 8);
   };
-  // Flags after an operation with this result.
-  const auto set_ns = [flag](std::uint32_t result) {
-    flag[S_N] = static_cast<std::uint8_t>(result >> 7 & 1);
-    flag[S_S] = flag[S_N] ^ flag[S_V];
-  };
-  const auto set_zns = [flag, set_ns](std::uint32_t result) {
-    flag[S_Z] = (result & 0xff) == 0 ? 1 : 0;
-    set_ns(result);
-  };
-  const auto add = [flag, set_zns](std::uint32_t a, std::uint32_t b, std::uint32_t carry) {
+  const auto is_set = [&flags](int which) { return (flags >> (8 * which) & 1) != 0; };
+  const auto add = [&flags](std::uint32_t a, std::uint32_t b, std::uint32_t carry) {
     const std::uint32_t sum = a + b + carry;
-    const std::uint32_t carries = (a & b) | (~sum & (a | b));
-    flag[S_H] = static_cast<std::uint8_t>(carries >> 3 & 1);
-    flag[S_C] = static_cast<std::uint8_t>(carries >> 7 & 1);
-    flag[S_V] = static_cast<std::uint8_t>(((a & b & ~sum) | (~a & ~b & sum)) >> 7 & 1);
-    set_zns(sum);
+    flags = (flags & ~kOfArithmetic) |
+            (kTables.of_result[sum & 0xff] ^ overflow(((a ^ sum) & (b ^ sum)) >> 7 & 1)) |
+            Flags{(a ^ b ^ sum) >> 4 & 1} << (8 * S_H) | sum >> 8;
     return static_cast<std::uint8_t>(sum);
   };
-  const auto subtract = [flag, set_ns](std::uint32_t a, std::uint32_t b, std::uint32_t carry, bool keeps_zero) {
-    const std::uint32_t difference = a - b - carry;
-    const std::uint32_t borrows = (~a & b) | (difference & (~a | b));
-    flag[S_H] = static_cast<std::uint8_t>(borrows >> 3 & 1);
-    flag[S_C] = static_cast<std::uint8_t>(borrows >> 7 & 1);
-    flag[S_V] = static_cast<std::uint8_t>(((a & ~b & ~difference) | (~a & b & difference)) >> 7 & 1);
-    const bool zero = (difference & 0xff) == 0;
-    flag[S_Z] = keeps_zero ? static_cast<std::uint8_t>(flag[S_Z] & (zero ? 1 : 0)) : zero ? 1 : 0;
-    set_ns(difference);
-    return static_cast<std::uint8_t>(difference);
+  const auto difference = [](std::uint32_t a, std::uint32_t b, std::uint32_t result) {
+    return (kTables.of_result[result & 0xff] ^ overflow(((a ^ b) & (a ^ result)) >> 7 & 1)) |
+           Flags{(a ^ b ^ result) >> 4 & 1} << (8 * S_H) | (result >> 8 & 1);
   };
-  const auto logic = [flag, set_zns](std::uint32_t result) {
-    flag[S_V] = 0;
-    set_zns(result);
+  const auto subtract = [&flags, difference](std::uint32_t a, std::uint32_t b) {
+    const std::uint32_t result = a - b;
+    flags = (flags & ~kOfArithmetic) | difference(a, b, result);
     return static_cast<std::uint8_t>(result);
   };
-  const auto shifted = [flag](std::uint32_t before, std::uint32_t after) {
-    flag[S_Z] = after == 0 ? 1 : 0;
-    flag[S_C] = static_cast<std::uint8_t>(before & 1);
-    flag[S_N] = static_cast<std::uint8_t>(after >> 7 & 1);
-    flag[S_V] = flag[S_N] ^ flag[S_C];
-    flag[S_S] = flag[S_N] ^ flag[S_V];
+  // With the carry. Zero stays set only where it was.
+  const auto subtract_on = [&flags, difference](std::uint32_t a, std::uint32_t b) {
+    const std::uint32_t result = a - b - static_cast<std::uint32_t>(flags & kCarry);
+    flags = (flags & ~kOfArithmetic) | (difference(a, b, result) & (flags | ~kZero));
+    return static_cast<std::uint8_t>(result);
+  };
+  const auto logic = [&flags](std::uint32_t result) {
+    flags = (flags & ~kOfResult) | kTables.of_result[result & 0xff];
+    return static_cast<std::uint8_t>(result);
+  };
+  const auto count = [&flags](std::uint32_t result, bool overflows) {
+    flags = (flags & ~kOfResult) | (kTables.of_result[result & 0xff] ^ overflow(overflows ? 1 : 0));
+    return static_cast<std::uint8_t>(result);
+  };
+  const auto shifted = [&flags](std::uint32_t before, std::uint32_t after) {
+    const std::uint32_t carry = before & 1;
+    flags = (flags & ~(kOfResult | kCarry)) |
+            (kTables.of_result[after & 0xff] ^ overflow((after >> 7 & 1) ^ carry)) | carry;
     return static_cast<std::uint8_t>(after);
   };
-  const auto subtract_word = [flag](std::uint32_t a, std::uint32_t result) {
-    flag[S_V] = static_cast<std::uint8_t>((a & ~result) >> 15 & 1);
-    flag[S_C] = static_cast<std::uint8_t>((result & ~a) >> 15 & 1);
-    flag[S_Z] = (result & 0xffff) == 0 ? 1 : 0;
-    flag[S_N] = static_cast<std::uint8_t>(result >> 15 & 1);
-    flag[S_S] = flag[S_N] ^ flag[S_V];
+  const auto of_word = [&flags](std::uint32_t result, std::uint32_t overflows, std::uint32_t carry) {
+    const Flags negative = result >> 15 & 1;
+    flags = (flags & ~(kOfResult | kCarry)) |
+            (((result & 0xffff) == 0 ? kZero : 0) |
+             ((negative * (kNegative | kSign)) ^ overflow(overflows >> 15 & 1))) |
+            (carry >> 15 & 1);
+  };
+  const auto subtract_word = [of_word](std::uint32_t before, std::uint32_t result) {
+    of_word(result, before & ~result, result & ~before);
+  };
+  const auto of_product = [&flags](std::uint32_t product) {
+    flags = (flags & ~(kZero | kCarry)) | ((product & 0xffff) == 0 ? kZero : 0) | (product >> 15 & 1);
   };
 
-  while (passed < cycles && pc < kFlashOctets) {
+  while (passed < cycles) {
     Operation& o = operations[pc / 2];
-    if (o.kind == kUnknown) o = decode(pc);
     std::uint32_t next = pc + 2;
     std::uint32_t took = 1;
     switch (o.kind) {
+      case kUnknown: o = decode(pc); continue;
+      case kLibsimavrs: goto libsimavrs;
       case kNop: break;
       case kMovw:
         data[o.d] = data[o.r];
@@ -446,8 +499,7 @@ template <bool kSeeksLoops> std::uint64_t FastCore::execute(avr_t& avr, std::uin
       case kMul: {
         const std::uint32_t product = std::uint32_t{data[o.d]} * data[o.r];
         set_pair(0, product);
-        flag[S_Z] = product == 0 ? 1 : 0;
-        flag[S_C] = static_cast<std::uint8_t>(product >> 15 & 1);
+        of_product(product);
         took = 2;
         break;
       }
@@ -455,24 +507,23 @@ template <bool kSeeksLoops> std::uint64_t FastCore::execute(avr_t& avr, std::uin
         const auto product = static_cast<std::uint32_t>(std::int32_t{static_cast<std::int8_t>(data[o.d])} *
                                                         static_cast<std::int8_t>(data[o.r]));
         set_pair(0, product);
-        flag[S_Z] = (product & 0xffff) == 0 ? 1 : 0;
-        flag[S_C] = static_cast<std::uint8_t>(product >> 15 & 1);
+        of_product(product);
         took = 2;
         break;
       }
-      case kCpc: subtract(data[o.d], data[o.r], flag[S_C], true); break;
-      case kSbc: data[o.d] = subtract(data[o.d], data[o.r], flag[S_C], true); break;
+      case kCpc: subtract_on(data[o.d], data[o.r]); break;
+      case kSbc: data[o.d] = subtract_on(data[o.d], data[o.r]); break;
       case kAdd: data[o.d] = add(data[o.d], data[o.r], 0); break;
-      case kAdc: data[o.d] = add(data[o.d], data[o.r], flag[S_C]); break;
-      case kCp: subtract(data[o.d], data[o.r], 0, false); break;
-      case kSub: data[o.d] = subtract(data[o.d], data[o.r], 0, false); break;
+      case kAdc: data[o.d] = add(data[o.d], data[o.r], static_cast<std::uint32_t>(flags & kCarry)); break;
+      case kCp: subtract(data[o.d], data[o.r]); break;
+      case kSub: data[o.d] = subtract(data[o.d], data[o.r]); break;
       case kAnd: data[o.d] = logic(data[o.d] & data[o.r]); break;
       case kEor: data[o.d] = logic(data[o.d] ^ data[o.r]); break;
       case kOr: data[o.d] = logic(data[o.d] | data[o.r]); break;
       case kMov: data[o.d] = data[o.r]; break;
-      case kCpi: subtract(data[o.d], o.k, 0, false); break;
-      case kSbci: data[o.d] = subtract(data[o.d], o.k, flag[S_C], true); break;
-      case kSubi: data[o.d] = subtract(data[o.d], o.k, 0, false); break;
+      case kCpi: subtract(data[o.d], o.k); break;
+      case kSbci: data[o.d] = subtract_on(data[o.d], o.k); break;
+      case kSubi: data[o.d] = subtract(data[o.d], o.k); break;
       case kOri: data[o.d] = logic(data[o.d] | o.k); break;
       case kAndi: data[o.d] = logic(data[o.d] & o.k); break;
       case kLdi: data[o.d] = static_cast<std::uint8_t>(o.k); break;
@@ -569,48 +620,30 @@ template <bool kSeeksLoops> std::uint64_t FastCore::execute(avr_t& avr, std::uin
       }
       case kCom:
         data[o.d] = logic(0xffu - data[o.d]);
-        flag[S_C] = 1;
+        flags |= kCarry;
         break;
-      case kNeg: {
-        const std::uint32_t before = data[o.d], result = (0u - before) & 0xff;
-        data[o.d] = static_cast<std::uint8_t>(result);
-        flag[S_H] = static_cast<std::uint8_t>((result | before) >> 3 & 1);
-        flag[S_V] = result == 0x80 ? 1 : 0;
-        flag[S_C] = result != 0 ? 1 : 0;
-        set_zns(result);
-        break;
-      }
+      case kNeg: data[o.d] = subtract(0, data[o.d]); break;
       case kSwap: data[o.d] = static_cast<std::uint8_t>(data[o.d] >> 4 | data[o.d] << 4); break;
-      case kInc: {
-        const auto result = static_cast<std::uint8_t>(data[o.d] + 1);
-        data[o.d] = result;
-        flag[S_V] = result == 0x80 ? 1 : 0;
-        set_zns(result);
-        break;
-      }
-      case kDec: {
-        const auto result = static_cast<std::uint8_t>(data[o.d] - 1);
-        data[o.d] = result;
-        flag[S_V] = result == 0x7f ? 1 : 0;
-        set_zns(result);
-        break;
-      }
+      case kInc: data[o.d] = count(data[o.d] + 1u, data[o.d] == 0x7f); break;
+      case kDec: data[o.d] = count(data[o.d] - 1u, data[o.d] == 0x80); break;
       case kAsr: data[o.d] = shifted(data[o.d], data[o.d] >> 1 | (data[o.d] & 0x80u)); break;
       case kLsr: data[o.d] = shifted(data[o.d], data[o.d] >> 1); break;
-      case kRor: data[o.d] = shifted(data[o.d], data[o.d] >> 1 | (flag[S_C] != 0 ? 0x80u : 0)); break;
+      case kRor:
+        data[o.d] = shifted(data[o.d], data[o.d] >> 1 | static_cast<std::uint32_t>(flags & kCarry) << 7);
+        break;
       case kJmp:
         next = o.k;
         took = 3;
-        break;
+        goto jump;
       case kRjmp:
         next = o.k;
         took = 2;
-        break;
+        goto jump;
       case kIjmp:
         next = pair(kZ) * 2;
         if (next >= kFlashOctets) goto libsimavrs;
         took = 2;
-        break;
+        goto jump;
       case kCall:
       case kRcall:
       case kIcall: {
@@ -622,7 +655,7 @@ template <bool kSeeksLoops> std::uint64_t FastCore::execute(avr_t& avr, std::uin
         set_pair(kSpl, top - 2);
         next = to;
         took = o.kind == kCall ? 4 : 3;
-        break;
+        goto jump;
       }
       case kRet: {
         const std::uint32_t top = pair(kSpl);
@@ -632,16 +665,12 @@ template <bool kSeeksLoops> std::uint64_t FastCore::execute(avr_t& avr, std::uin
         set_pair(kSpl, top + 2);
         next = to;
         took = 4;
-        break;
+        goto jump;
       }
       case kAdiw: {
         const std::uint32_t before = pair(o.d), result = (before + o.k) & 0xffff;
         set_pair(o.d, result);
-        flag[S_V] = static_cast<std::uint8_t>((~before & result) >> 15 & 1);
-        flag[S_C] = static_cast<std::uint8_t>((~result & before) >> 15 & 1);
-        flag[S_Z] = result == 0 ? 1 : 0;
-        flag[S_N] = static_cast<std::uint8_t>(result >> 15 & 1);
-        flag[S_S] = flag[S_N] ^ flag[S_V];
+        of_word(result, ~before & result, ~result & before);
         took = 2;
         break;
       }
@@ -666,17 +695,21 @@ template <bool kSeeksLoops> std::uint64_t FastCore::execute(avr_t& avr, std::uin
         break;
       }
       case kBrbs:
-        if (flag[o.d] != 0) next = o.k, took = 2;
-        break;
+        if (!is_set(o.d)) break;
+        next = o.k;
+        took = 2;
+        goto jump;
       case kBrbc:
-        if (flag[o.d] == 0) next = o.k, took = 2;
-        break;
-      case kBst: flag[S_T] = static_cast<std::uint8_t>(data[o.d] >> o.r & 1); break;
+        if (is_set(o.d)) break;
+        next = o.k;
+        took = 2;
+        goto jump;
+      case kBst: flags = (flags & ~kTransfer) | ((data[o.d] >> o.r & 1) != 0 ? kTransfer : 0); break;
       case kBld:
-        data[o.d] = static_cast<std::uint8_t>((data[o.d] & ~(1u << o.r)) | std::uint32_t{flag[S_T]} << o.r);
+        data[o.d] = static_cast<std::uint8_t>((data[o.d] & ~(1u << o.r)) | (is_set(S_T) ? 1u : 0u) << o.r);
         break;
-      case kSetFlag: flag[o.d] = 1; break;
-      case kClearFlag: flag[o.d] = 0; break;
+      case kSetFlag: flags |= flag(o.d); break;
+      case kClearFlag: flags &= ~flag(o.d); break;
       case kLpm: {
         const std::uint32_t address = pair(kZ);
         if (address >= kFlashOctets) goto libsimavrs;
@@ -697,28 +730,83 @@ template <bool kSeeksLoops> std::uint64_t FastCore::execute(avr_t& avr, std::uin
         // A program that sets its LED in each loop() writes what is there. Without pull-ups this has no effect.
         if (data[o.d] != data[o.k] || (data[o.k + 1] & ~data[o.k]) != 0) goto libsimavrs;
         break;
-      case kReadFlags: {
-        std::uint8_t flags = 0;
-        for (int i = 0; i < 8; ++i) flags = static_cast<std::uint8_t>(flags | flag[i] << i);
-        data[kSreg] = flags;
-        data[o.d] = flags;
+      case kReadFlags: data[o.d] = data[kSreg] = as_octet(flags); break;
+      case kWriteStackPointer: data[o.k] = data[o.d]; break;
+      case kReadConverter:
+        if (!kSeeksLoops) goto libsimavrs;
+        forget_anchor();
+        data[o.d] = converter_->read(avr, o.k);
+        next += 2;
+        took = 2;
+        break;
+      case kWriteConverter: {
+        if (!kSeeksLoops) goto libsimavrs;
+        const std::uint64_t ends_in = converter_->write(avr, avr.cycle + passed, o.k, data[o.d]);
+        if (ends_in == 0) goto libsimavrs;
+        forget_anchor();
+        cycles = std::min(cycles, passed + ends_in);
+        next += 2;
+        took = 2;
         break;
       }
-      default: goto libsimavrs;
+      case kWriteFlags:
+      case kEnableInterrupts: {
+        const bool enables = o.kind == kEnableInterrupts || data[o.d] >> S_I != 0, were_off = !is_set(S_I);
+        if (enables && were_off && (!kSeeksLoops || avr_has_pending_interrupts(&avr) != 0)) goto libsimavrs;
+        if (o.kind == kWriteFlags) {
+          data[kSreg] = data[o.d];
+          flags = kTables.spread[data[o.d]];
+        }
+        if (!enables || !were_off) break;
+        // Interrupts are served after the next instruction. libsimavr counts up to 0, at each boundary of instructions.
+        flags |= kInterrupts;
+        forget_anchor();
+        passed += took;
+        pc = next;
+        avr.interrupt_state = -2;
+        if (passed >= cycles) continue;
+        avr.interrupt_state = -1;
+        avr.pc = pc;
+        avr.cycle += passed;
+        std::memcpy(avr.sreg, &flags, sizeof flags);
+        const std::uint64_t more = execute<false>(avr, 1).passed;
+        std::memcpy(&flags, avr.sreg, sizeof flags);
+        pc = avr.pc;
+        avr.cycle -= passed + more;
+        passed += more;
+        if (more == 0) goto libsimavrs;
+        if (passed < cycles) avr.interrupt_state = 0;
+        continue;
+      }
+      default: __builtin_unreachable();
     }
+    pc = next;
+    passed += took;
+    continue;
+  jump:
     const bool jumps_back = next <= pc;
     pc = next;
     passed += took;
-    if (kSeeksLoops && jumps_back && is_back(avr, pc, avr.cycle + passed)) {
-      avr.pc = pc;
-      enter_loop(avr, static_cast<std::uint32_t>(avr.cycle + passed - anchor_.cycle));
-      break;
+    if (!kSeeksLoops || !jumps_back) continue;
+    const std::uint64_t cycle = avr.cycle + passed;
+    if (pc == anchor_.pc) {
+      std::memcpy(avr.sreg, &flags, sizeof flags);
+      if (is_back(avr)) {
+        if (cycle - anchor_.cycle > kLongestLoop) continue;
+        avr.pc = pc;
+        enter_loop(avr, static_cast<std::uint32_t>(cycle - anchor_.cycle));
+        break;
+      }
     }
+    if (++anchor_.jumps < anchor_.patience) continue;
+    std::memcpy(avr.sreg, &flags, sizeof flags);
+    set_anchor(avr, pc, cycle);
   }
 libsimavrs:
   avr.pc = pc;
   avr.cycle += passed;
-  return passed;
+  std::memcpy(avr.sreg, &flags, sizeof flags);
+  return {passed, cycles};
 }
 
 }  // namespace kilotwin::firmware

@@ -13,6 +13,7 @@
 #include <memory>
 #include <vector>
 
+#include "services/comm/firmware/converter.hpp"
 #include "services/comm/firmware/flash_image.hpp"
 
 struct avr_t;
@@ -21,12 +22,17 @@ namespace kilotwin::firmware {
 
 class FastCore {
  public:
-  /// The processor must outlive this object, and its peripherals must be complete; forget() says where its flash changes.
-  explicit FastCore(const avr_t&);
+  /// Processor and converter must outlive this object, and its peripherals must be complete; forget() says where its flash
+  /// changes. Without a converter, its registers are libsimavr's.
+  explicit FastCore(const avr_t&, const Converter* = nullptr);
 
-  /// Executes instructions while fewer than `cycles` have passed, and stops before the first that is libsimavr's. Returns the number
-  /// of cycles. The caller makes sure that no interrupt waits and that the processor runs.
-  std::uint64_t run(avr_t&, std::uint64_t cycles);
+  struct Run {
+    std::uint64_t passed;  ///< cycles; fewer than `due` if the next instruction is libsimavr's
+    std::uint64_t due;     ///< the given cycles, or fewer if an instruction has scheduled something
+  };
+  /// Executes instructions while fewer than `cycles` have passed and nothing is due, and stops before the first that is libsimavr's.
+  /// The caller makes sure that no interrupt waits and that the processor runs.
+  Run run(avr_t&, std::uint64_t cycles);
   /// Brings registers, RAM and program counter up to the present cycle.
   void settle(avr_t&);
   /// As settle(), before something else than run() changes registers, RAM or program counter.
@@ -71,9 +77,10 @@ class FastCore {
     Memory memory;
   };
 
-  template <bool kSeeksLoops> std::uint64_t execute(avr_t&, std::uint64_t cycles);
+  template <bool kSeeksLoops> Run execute(avr_t&, std::uint64_t cycles);
   [[nodiscard]] bool inputs_are(const avr_t&, const Memory&) const;
-  [[nodiscard]] bool is_back(const avr_t&, std::uint32_t pc, std::uint64_t cycle);
+  [[nodiscard]] bool is_back(const avr_t&) const;
+  void set_anchor(const avr_t&, std::uint32_t pc, std::uint64_t cycle);
   void enter_loop(avr_t&, std::uint32_t period);
   std::uint64_t skip(avr_t&, std::uint64_t cycles);
   void forget_anchor() { anchor_.pc = kNowhere, anchor_.jumps = 0, anchor_.patience = kFirstPatience; }
@@ -83,9 +90,12 @@ class FastCore {
   }
 
   const std::uint8_t* flash_;
+  const Converter* converter_;
   std::bitset<0x100> plain_;  ///< I/O registers that are read without effect, at their addresses in data space
   std::array<std::uint8_t, 0x100> inputs_{};  ///< 0xff for I/O registers that operations read but never change
-  std::unique_ptr<std::array<Operation, kFlashOctets / 2>> operations_;
+  /// Per word of the flash. The last stands behind its end.
+  using Operations = std::array<Operation, kFlashOctets / 2 + 1>;
+  std::unique_ptr<Operations> operations_;
   Anchor anchor_;
   Waiting waiting_, marked_;
 };

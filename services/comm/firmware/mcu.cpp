@@ -137,6 +137,7 @@ Mcu::Mcu(const FlashImage& image, const std::array<std::uint8_t, kEepromOctets>&
   for (std::size_t i = 0; i < comparator_.size(); ++i)
     comparator_[i] = avr_io_getirq(avr_, AVR_IOCTL_ACOMP_GETIRQ, ACOMP_IRQ_AIN0 + static_cast<int>(i));
   converter_ = avr_io_getirq(avr_, AVR_IOCTL_ADC_GETIRQ, 0);
+  if (core == Core::kFast) fast_converter_ = std::make_unique<Converter>(*avr_, [this] { start_conversion(); });
   for (const int pin : kInfraredPins)
     avr_irq_register_notify(avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ('B'), pin), on_led, this);
   avr_irq_register_notify(converter_ + ADC_IRQ_OUT_TRIGGER, on_conversion, this);
@@ -145,7 +146,7 @@ Mcu::Mcu(const FlashImage& image, const std::array<std::uint8_t, kEepromOctets>&
   avr_irq_register_notify(avr_io_getirq(avr_, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), on_serial, this);
   for (const Register one : {kDdrB, kDdrD, kTccr2a, kOcr2a, kOcr2b})
     avr_irq_register_notify(avr_iomem_getirq(avr_, one, nullptr, AVR_IOMEM_IRQ_ALL), on_motor, this);
-  if (core == Core::kFast) core_ = std::make_unique<FastCore>(*avr_);
+  if (core == Core::kFast) core_ = std::make_unique<FastCore>(*avr_, fast_converter_.get());
   after_reset();
 
   for (int i = 0; i < avr_->irq_pool.count; ++i) {
@@ -259,8 +260,8 @@ void Mcu::run_burst(OwnCycles budget) {
   if (next != nullptr) cycles = next->when > avr_->cycle ? std::min(cycles, next->when - avr_->cycle) : 1;
   avr_flashaddr_t at = avr_->pc;
   if (core_ && avr_->interrupt_state == 0) {
-    const std::uint64_t passed = core_->run(*avr_, cycles);
-    cycles = passed < cycles ? 1 : 0;  // then one instruction of libsimavr
+    const FastCore::Run run = core_->run(*avr_, cycles);
+    cycles = run.passed < run.due ? 1 : 0;  // then one instruction of libsimavr
     at = avr_->pc;
   }
   avr_->run_cycle_count = cycles;
@@ -275,6 +276,7 @@ void Mcu::run_burst(OwnCycles budget) {
     }
     return;
   }
+  if (fast_converter_) fast_converter_->end_due(*avr_);
   avr_cycle_timer_process(avr_);
   avr_->pc = at % kFlashOctets;
   serve_interrupts();
@@ -489,7 +491,11 @@ void Mcu::start_conversion() {
   const double noise = sd > 0 ? sd * random_.normal(Stream::kConverter, robot_, Tick{n >> 16}, n & 0xffff) : 0;
   const auto counts = static_cast<std::int32_t>(std::clamp(reading + noise + 0.5, 0.0, double{kCounts}));
   const bool internal = (mux & kReference) == kReference;
-  avr_raise_irq(converter_ + line, millivolts(counts, internal ? kInternalReference_mV : kReference_mV));
+  const std::uint32_t voltage_mV = millivolts(counts, internal ? kInternalReference_mV : kReference_mV);
+  if (fast_converter_)
+    fast_converter_->set_voltage(line, voltage_mV);
+  else
+    avr_raise_irq(converter_ + line, voltage_mV);
 }
 
 void Mcu::on_serial(avr_irq_t*, std::uint32_t octet, void* mcu) {

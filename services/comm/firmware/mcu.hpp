@@ -20,6 +20,7 @@
 #include "core/base/motor_phases.h"
 #include "core/random/random.hpp"
 #include "core/senses/robot_senses.hpp"
+#include "services/comm/firmware/converter.hpp"
 #include "services/comm/firmware/fast_core.hpp"
 #include "services/comm/firmware/flash_image.hpp"
 
@@ -161,7 +162,8 @@ class Mcu {
   friend struct LogHook;
 
   avr_t* avr_;
-  std::unique_ptr<FastCore> core_;  ///< null: libsimavr executes everything
+  std::unique_ptr<Converter> fast_converter_;  ///< null: libsimavr executes everything
+  std::unique_ptr<FastCore> core_;             ///< as fast_converter_
   const Random random_;
   const std::uint32_t robot_;
   senses::Readings readings_;

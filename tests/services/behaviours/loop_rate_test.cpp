@@ -65,6 +65,9 @@ TEST(LoopRate, FunctionsOfKilolibTakeTheirTime) {
   const auto cycles = [&](const std::string& statement) { return 262144 / calls_per_tick(statement) - plain; };
   EXPECT_NEAR(cycles("set_motors(n, n);"), 20, 15);
   EXPECT_NEAR(cycles("v = message_crc(&other);"), 400, 60);
+  EXPECT_NEAR(cycles("v = rand();"), 815, 80);
+  EXPECT_NEAR(cycles("v = kilo_ticks / 800;"), 620, 60);
+  EXPECT_NEAR(cycles("v = v / 10;"), 220, 40);
 }
 
 /// The share of requests at which kilo_message_tx finds `busy` set, in 600 requests.
@@ -96,6 +99,15 @@ TEST(LoopRate, AMessageIsAskedForAtAnyPlaceOfACallThatChangesNothing) {
   // Five standard deviations of 600 requests are 0.1.
   EXPECT_NEAR(busy_share("busy = 1; " + wait + " busy = 0; " + wait), 0.5, 0.1);
   EXPECT_NEAR(busy_share("busy = 1; " + wait + " busy = 0; " + wait + wait + wait), 0.25, 0.1);
+}
+
+TEST(LoopRate, AMessageIsAskedForWithinStraightCode) {
+  // Neither a loop nor a function begins between the two assignments.
+  std::string divisions;
+  for (const int divisor : {7, 11, 13, 17, 19, 23, 29, 31})
+    divisions += "v = (uint16_t)(v + 60000u) / " + std::to_string(divisor) + "; ";
+  EXPECT_NEAR(busy_share("busy = 1; " + divisions + "busy = 0; " + divisions), 0.5, 0.1);
+  EXPECT_NEAR(busy_share("busy = 1; " + divisions + "busy = 0; " + divisions + divisions + divisions), 0.25, 0.1);
 }
 
 TEST(LoopRate, ADelayThatTheCallbackCausesLasts) {

@@ -66,6 +66,34 @@ TEST(Mcu, RunsOnCommandAndDrivesMotorsAndLed) {
   EXPECT_EQ(mcu.outputs().motor_left, 0) << "paused";
 }
 
+/// A program that uses the converter's registers and the interrupt flag in any order.
+const char* const kUsesOfTheConverter =
+    "static uint8_t n; static volatile uint16_t sum, ends;\n"
+    "ISR(ADC_vect) { sum += ADCL; sum += ADCH << 8; ++ends; ADCSRA &= ~_BV(ADIE); }\n"
+    "static void wait(void) { while (ADCSRA & _BV(ADSC)) {} }\n"
+    "static void one(uint8_t mux, uint8_t control) { ADMUX = mux; ADCSRA = control; wait(); sum += ADC; }\n"
+    "static void setup(void) {}\n"
+    "static void loop(void) {\n"
+    "  switch (n++ % 14) {\n"
+    "    case 0: one(0x46, 0xc3); break;\n"
+    "    case 1: ADCSRA = 0xc3; ADCSRA = 0xc3; ADMUX = 0x47; ADCSRA = 0x83; wait(); sum += ADC; break;\n"
+    "    case 2: ADCSRA = 0; one(0x47, 0xc4); one(0x47, 0xc4); break;\n"
+    "    case 3: ADMUX = 0x46; ADCSRA = 0xcb; break;\n"
+    "    case 4: one(0x47, 0xc2); sum += ADCH; sum += ADCL; break;\n"
+    "    case 5: one(0x67, 0xc3); sum += ADCH; break;\n"
+    "    case 6: ADCSRB = 0; ADCSRA = 0xe3; for (uint8_t i = 0; i < 60; ++i) sum += ADC;\n"
+    "      ADCSRA = 0xc3; wait(); ADCSRB = 1; break;\n"
+    "    case 7: cli(); sum += TCNT0; sei(); ++sum; sei(); ++sum; cli(); sei(); cli(); sei(); break;\n"
+    "    case 8: ADMUX = 0x40; ADCSRA = 0xa3; for (uint8_t i = 0; i < 200; ++i) sum += ADCSRA; break;\n"
+    "    case 9: one(0xc8, 0xc7); break;\n"
+    "    case 10: one(0x46, 0xc0); one(0x46, 0xc1); break;\n"
+    "    case 11: ADCSRA = 0xc3; ADCSRA = 0x03; ADCSRA = 0x83; ADCSRA = 0xc3; ADCSRA = 0x93; wait(); break;\n"
+    "    case 12: for (uint8_t i = 0; i < 100; ++i) { const uint8_t flags = SREG; cli(); ++sum; SREG = flags; } "
+    "break;\n"
+    "    default: one(0x47, 0xd3); ADCSRA = 0xd3; for (uint8_t i = 0; i < 9; ++i) sum += ADC; wait(); sum += ADC;\n"
+    "  }\n"
+    "  set_motors(sum, ends); }";
+
 /// All that a robot shows and holds is the same at any time, whatever executes its instructions.
 TEST(Mcu, TheFastCoreAgreesWithLibsimavr) {
   const FlashImage programs[] = {
@@ -82,7 +110,8 @@ TEST(Mcu, TheFastCoreAgreesWithLibsimavr) {
           "static void loop(void) { for (uint8_t i = 1; i < 20; ++i) table[i] = table[i - 1] * 7 / (i + 1) - "
           "kilo_ticks;\n"
           "  sum = sum * 0.5f + table[19]; set_motors(table[7], sum); }",
-          "kilo_message_rx = receive;"))};
+          "kilo_message_rx = receive;")),
+      firmware("#include <avr/interrupt.h>\n#include <avr/io.h>\n" + whole_program(kUsesOfTheConverter))};
   senses::Readings readings{};
   readings.light = 300;
   readings.light_sd = 4;
