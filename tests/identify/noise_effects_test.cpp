@@ -144,6 +144,25 @@ TEST(NoiseInterval, HoldsTheTruth) {
   EXPECT_TRUE(std::isnan(interval.low.wall_mm2_s)) << "contact noise has no interval";
 }
 
+TEST(NoiseInterval, OfTheFactorHoldsTheTruthWhereOtherNoiseMayBeNone) {
+  // The true noise is that of the factor alone. Wheel noise explains nearly the same, so that the estimate shares the noise between
+  // both. The interval must reach the share without wheel noise.
+  const truth::Scene scene = small({});
+  const double truth_s = scene.factor_sd * scene.factor_sd * scene.step_s;
+  constexpr int kSets = 8;
+  int held = 0;
+  for (std::uint64_t seed = 1; seed <= kSets; ++seed) {
+    const MeasuredSet set = set_of(scene, played(scene, seed));
+    const Fitter fitter(set, 2);
+    FitState state(set);
+    fitter.fit_base(state);
+    const NoiseInterval interval = fitter.noise_interval(state);
+    held += interval.low.factor_s <= truth_s && truth_s <= interval.high.factor_s ? 1 : 0;
+    EXPECT_LT(interval.high.factor_s, 4 * truth_s) << seed << ": the interval says something";
+  }
+  EXPECT_GE(held, kSets - 1);
+}
+
 TEST(Uncertainty, OfTheBaseSpeedContainsThatOfTheMeanBias) {
   const Fitted f(small({}));
   const Uncertainty u = uncertainty_of(f.fitter, f.state);

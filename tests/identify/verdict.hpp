@@ -21,6 +21,7 @@ struct Verdict {
   std::vector<std::string> unnamed;         // true effects and faults not named
   std::vector<std::string> false_findings;  // effects and faults that do not exist
   std::vector<std::string> found;           // "name [covariates]"
+  std::string unexplained;  // the sentence that says that a systematic error is left; empty: none is
   double seconds = 0;
   std::string failure;  // reason for a failure; empty if none
 
