@@ -13,6 +13,8 @@
 #include "clients/identify/fit/linearisation.hpp"
 #include "clients/identify/fit/profile.hpp"
 #include "core/os/worker_pool.hpp"
+#include "core/stats/distributions.hpp"
+#include "core/stats/moments.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -23,20 +25,21 @@ constexpr std::size_t kSpreading = kPosition;
 using NoiseVector = Eigen::Matrix<double, kNoises, 1>;
 using PoseByBias = Eigen::Matrix<double, 3, 2>;
 
+/// A lower variance has no influence.
+constexpr std::array<double, kNoises> kLeast = {1e-6, 1e-4, 1e-8, 1e-6, 1e-4, 1e-6};
+
 NoiseVector logs_of(const Noise& n) {
   NoiseVector v;
   v << n.factor_s, n.wheel_mm2_s, n.heading_rad2_s, n.drift_mm2_s, n.position_mm2, n.heading_rad2;
   return v.array().log();
 }
-/// Variances within bounds. Below the lower bound a variance has no influence; above the upper bound it hides
-/// everything.
+/// Variances within bounds. Above the upper bound a variance hides everything.
 NoiseVector variances(const NoiseVector& logs) {
-  constexpr std::array<double, kNoises> kLow = {1e-6, 1e-4, 1e-8, 1e-6, 1e-4, 1e-6},
-                                        kHigh = {1, 100, 1, 100, 1e4, 10};
+  constexpr std::array<double, kNoises> kMost = {1, 100, 1, 100, 1e4, 10};
   NoiseVector v;
   for (Eigen::Index i = 0; i < kNoises; ++i) {
     const auto k = static_cast<std::size_t>(i);
-    v[i] = std::clamp(std::exp(logs[i]), kLow[k], kHigh[k]);
+    v[i] = std::clamp(std::exp(logs[i]), kLeast[k], kMost[k]);
   }
   return v;
 }
@@ -62,6 +65,7 @@ struct FilterInterval {
   std::array<Eigen::Matrix3d, kSpreading> spread;
   Eigen::Matrix3d more = Eigen::Matrix3d::Zero();
   // The measurement at the end of the interval.
+  double time_s = 0;
   int size = 0;
   Eigen::Matrix3d jacobian = Eigen::Matrix3d::Zero();
   /// Innovation along the path, and the correction that it applied.
@@ -109,7 +113,8 @@ class Recorder {
     now_.spread[kWheel] += h * ways.by_wheel * ways.by_wheel.transpose();
     now_.spread[kHeading](2, 2) += h;
   }
-  void update(const Innovation& innovation, const Sample&) {
+  void update(const Innovation& innovation, const Sample& sample) {
+    now_.time_s = sample.time_s;
     now_.size = innovation.size;
     now_.jacobian = innovation.jacobian;
     now_.difference = innovation.difference;
@@ -153,8 +158,10 @@ Path path_of(const MotionModel& model, const TrackView& view) {
   return {recorder.first, model.noise.position_mm2, std::move(recorder.stretches), view.track->robot};
 }
 
-/// Log likelihood of a path's measurements under other variances, and about the model's biases.
-double log_likelihood(const Path& path, const NoiseVector& variance, BiasSums* biases) {
+/// Log likelihood of a path's measurements under other variances, and about the model's biases. each(time, value): of each
+/// measurement.
+template <class Each>
+double log_likelihood(const Path& path, const NoiseVector& variance, BiasSums* biases, Each&& each) {
   double sum = 0;
   Eigen::Matrix3d p = path.first;
   p(0, 0) += variance[kPosition] - path.position_mm2;
@@ -182,7 +189,10 @@ double log_likelihood(const Path& path, const NoiseVector& variance, BiasSums* b
     Eigen::Matrix3d inverse = seen.inverse();
     const double distance2 = difference.dot(inverse * difference);
     const double factor = outlier_factor(distance2, s.size);
-    sum += std::max(-1e3, -0.5 * (std::log(seen.determinant()) + s.size * std::log(factor) + distance2 / factor));
+    const double value =
+        std::max(-1e3, -0.5 * (std::log(seen.determinant()) + s.size * std::log(factor) + distance2 / factor));
+    sum += value;
+    each(s.time_s, value);
     inverse /= factor;
     const Eigen::Matrix3d gain = ph * inverse;
     if (biases != nullptr) {
@@ -198,6 +208,21 @@ double log_likelihood(const Path& path, const NoiseVector& variance, BiasSums* b
     p = (0.5 * (p + p.transpose())).eval();
   }
   return sum;
+}
+
+double log_likelihood(const Path& path, const NoiseVector& variance, BiasSums* biases) {
+  return log_likelihood(path, variance, biases, [](double, double) {});
+}
+
+/// Log likelihood by stretches of a path that hardly depend on each other.
+std::vector<double> by_stretches(const Path& path, const NoiseVector& variance) {
+  constexpr double kStretch_s = 20;
+  std::map<double, double> sums;
+  log_likelihood(path, variance, nullptr,
+                 [&](double time_s, double value) { sums[std::floor(time_s / kStretch_s)] += value; });
+  std::vector<double> out;
+  for (const auto& [stretch, sum] : sums) out.push_back(sum);
+  return out;
 }
 
 /// Weak prior about the start: bounds the search where the data say nothing.
@@ -327,6 +352,52 @@ class Climb {
     return out;
   }
 
+  /// By which factor the drop at the ends of an interval exceeds that of a perfect model and of many data. The scores of stretches
+  /// along a direction may vary more than the curvature expects (Kent 1982), and few stretches tell little.
+  [[nodiscard]] double widening(const NoiseVector& at, const NoiseVector& along) const {
+    constexpr double kStep = 0.05;
+    constexpr double kFewest = 8;
+    const NoiseVector up = variances(at + kStep * along), down = variances(at - kStep * along);
+    stats::Moments scores;
+    for (const Path& path : paths_) {
+      const std::vector<double> higher = by_stretches(path, up), lower = by_stretches(path, down);
+      for (std::size_t k = 0; k < higher.size(); ++k) scores.add((higher[k] - lower[k]) / (2 * kStep));
+    }
+    const std::vector<double> three = values({at + kStep * along, at, at - kStep * along});
+    const double curvature = (2 * three[1] - three[0] - three[2]) / (kStep * kStep);
+    const auto count = static_cast<double>(scores.count());
+    const double of_scores = count * scores.standard_deviation() * scores.standard_deviation();
+    const double dispersion = count < kFewest || curvature <= 0 ? 1 : std::max(1.0, of_scores / curvature);
+    const double wider = stats::student_quantile(0.975, std::max(kFewest, count) - 1) / stats::kNormal95;
+    return dispersion * wider * wider;
+  }
+
+  /// How far variance `i` moves along `ridge`, in its logarithm, until the profile log likelihood is `most_drop` below `value`.
+  /// `ridge`: about how the others follow.
+  [[nodiscard]] double profile_end(const NoiseVector& best, double value, Eigen::Index i, const NoiseVector& ridge,
+                                   const Eigen::MatrixXd& curvature, double most_drop) const {
+    // By factors of e: beyond, the variance hides everything or has no influence.
+    constexpr double kFarthest = 9;
+    const double along = std::abs(curvature.row(i).dot(ridge.head(size())));
+    const double first = std::clamp(std::sqrt(2 * most_drop / std::max(along, 1e-3)), 0.02, 3.0);
+    const Search others = from_near(curvature, i);
+    // The others start from the nearest point that is known.
+    std::map<double, NoiseVector> known{{0, best}};
+    const auto drop = [&](double far) {
+      auto near = known.lower_bound(far);
+      if (near == known.end() || (near != known.begin() && far - std::prev(near)->first < near->first - far))
+        --near;
+      NoiseVector at = near->second;
+      const NoiseVector moved = at + (far - near->first) * ridge;
+      at[i] = moved[i];
+      if (this->value(moved) > this->value(at)) at = moved;
+      const double found = (*this)(at, others);
+      known[far] = at;
+      return value - found;
+    };
+    return profile_distance(drop, first, kFarthest, most_drop);
+  }
+
   /// Number of variances that these data have.
   [[nodiscard]] Eigen::Index size() const { return has_headings_ ? kNoises : kMeasuredHeading; }
 
@@ -424,39 +495,33 @@ NoiseInterval noise_interval(const MotionModel& model, const std::vector<const T
   climb(best, climb.from_afar());
   const Eigen::MatrixXd curvature = climb.curvature(best);
   double value = climb(best, climb.from_near(curvature, -1));
+  // By how much the likelihood falls if one process noise is none.
+  NoiseVector without = NoiseVector::Constant(INFINITY);
+  for (Eigen::Index i = 0; i < kPosition; ++i) {
+    NoiseVector at = best;
+    at[i] = std::log(kLeast[static_cast<std::size_t>(i)]);
+    const double found = climb(at, climb.from_near(curvature, i));
+    if (found > value) best = at;
+    value = std::max(value, found);
+    without[i] = value - found;
+  }
   NoiseVector low = NoiseVector::Constant(NAN), high = low;
   for (Eigen::Index i = 0; i < climb.size(); ++i) {
-    // By factors of e: beyond, the variance hides everything or has no influence.
-    constexpr double kFarthest = 9;
     const NoiseVector ridge = along_ridge(curvature, i);
-    const double first = std::clamp(
-        std::sqrt(2 * kProfileDrop95 / std::max(curvature.row(i).dot(ridge.head(climb.size())), 1e-3)), 0.02, 3.0);
-    const Climb::Search others = climb.from_near(curvature, i);
+    bool others_at_bound = false;
+    for (Eigen::Index j = 0; j < kPosition; ++j)
+      others_at_bound = others_at_bound || (j != i && without[j] < kProfileDrop95);
+    const double most_drop =
+        (others_at_bound ? kProfileDropAtBound95 : kProfileDrop95) * climb.widening(best, ridge);
     const auto end = [&](double sign) {
-      // The others follow from the nearest point that is known.
-      std::map<double, NoiseVector> known{{0, best}};
-      const auto drop = [&](double far) {
-        auto near = known.lower_bound(far);
-        if (near == known.end() || (near != known.begin() && far - std::prev(near)->first < near->first - far))
-          --near;
-        NoiseVector at = near->second;
-        const double ahead = sign * (far - near->first);
-        const NoiseVector along = at + ahead * ridge;
-        at[i] += ahead;
-        if (climb.value(along) > climb.value(at)) at = along;
-        const double found = climb(at, others);
-        known[far] = at;
-        value = std::max(value, found);
-        return value - found;
-      };
-      return std::exp(best[i] + sign * profile_distance(drop, first, kFarthest));
+      return std::exp(best[i] + sign * climb.profile_end(best, value, i, sign * ridge, curvature, most_drop));
     };
-    low[i] = end(-1);
+    low[i] = without[i] < most_drop ? 0 : end(-1);
     high[i] = end(1);
   }
   Noise unknown;
   unknown.wall_mm2_s = unknown.wall_rad2_s = unknown.contact_mm2_s = unknown.contact_rad2_s = NAN;
-  return {with(unknown, low), with(unknown, high)};
+  return {with(unknown, low), with(unknown, high), with(model.noise, variances(best))};
 }
 
 Noise most_likely_noise(const MotionModel& start, const std::vector<const TrackView*>& tracks, bool has_headings,
