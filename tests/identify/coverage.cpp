@@ -50,9 +50,39 @@ std::optional<double> change_of_speed(const Scene& scene, const Situation& at) {
   return alike ? std::optional(push.gain.left - 1) : std::nullopt;
 }
 
-json result_in(const std::filesystem::path& out) {
-  std::ifstream in(out / "result.json");
-  return json::parse(in);
+/// A point of a band of relative changes.
+struct BandPoint {
+  double truth, value, low, high;
+};
+
+/// The band of the effect found, with the true changes. Empty if there is no band, if several effects were found, or if the true
+/// effect does not change both wheels alike.
+std::vector<BandPoint> band_of(const Scene& scene, const json& result) {
+  std::vector<BandPoint> points;
+  const json& effects = result.at("effects");
+  if (effects.size() != 1 || effects[0].at("covariates").size() != 1) return points;
+  if (!effects[0].at("name").get<std::string>().starts_with("speed-by-")) return points;
+  const std::string covariate = effects[0].at("covariates")[0];
+  for (const json& band : effects[0].at("parameters").value("bands_95", json::array())) {
+    for (std::size_t i = 0; i < band.at("at").size(); ++i) {
+      const std::optional<Situation> at = situation_at(covariate, band.at("at")[i]);
+      if (const std::optional<double> truth = at ? change_of_speed(scene, *at) : std::nullopt)
+        points.push_back({*truth, band.at("value")[i], band.at("low")[i], band.at("high")[i]});
+    }
+  }
+  return points;
+}
+
+/// The model's curves are relative to a mean speed of the data, the true ones to that of an undisturbed robot. This factor turns true
+/// speeds and biases into those of the model: the mean over the band, weighted by its precision.
+double level_of(const std::vector<BandPoint>& band) {
+  double sum = 0, weights = 0;
+  for (const BandPoint& p : band) {
+    const double weight = 1 / ((p.high - p.low) * (p.high - p.low));
+    sum += weight * (1 + p.truth) / (1 + p.value);
+    weights += weight;
+  }
+  return band.empty() ? 1 : sum / weights;
 }
 
 }  // namespace
@@ -77,55 +107,46 @@ void Coverage::add_interval(const std::string& set, const std::string& parameter
 
 void Coverage::add(const std::string& kind, const Scene& scene, const Play& played,
                    const std::filesystem::path& out) {
-  const json result = result_in(out);
+  std::ifstream in(out / "result.json");
+  const json result = json::parse(in);
+  const std::vector<BandPoint> band = scene.effects.empty() ? std::vector<BandPoint>{} : band_of(scene, result);
+  const double level = level_of(band);
+  if (!band.empty()) {
+    Share& points =
+        bands_[fmt::format("{}, {}", kind, result.at("effects")[0].at("name").get<std::string>())].emplace_back();
+    for (const BandPoint& p : band) {
+      const double truth = (1 + p.truth) / level - 1;
+      points.held += p.low <= truth && truth <= p.high ? 1 : 0;
+      ++points.all;
+    }
+  } else if (!scene.effects.empty()) {
+    ++without_band_[kind];
+  }
   const auto with_sd = [&](const char* parameter, double truth, double value, double sd) {
     add_interval(scene.name, parameter, truth, value - stats::kNormal95 * sd, value + stats::kNormal95 * sd);
   };
   const auto base = [&](const char* parameter, double truth) {
     with_sd(parameter, truth, result.at("base").at(parameter), result.at("base_sd").at(parameter));
   };
-  base("straight_speed_mm_s", scene.straight_mm_s);
-  base("turn_speed_mm_s", scene.turn_mm_s);
-  base("wheel_base_mm", scene.wheel_base_mm);
-  base("tracked_point_ahead_mm", scene.tracked_ahead_mm);
-  base("tracked_point_left_mm", 0);
   const auto noise = [&](const char* parameter, double truth) {
     const json &low = result.at("noise_low").at(parameter), &high = result.at("noise_high").at(parameter);
     // Null: a variance that may be as large as any.
     add_interval(scene.name, parameter, truth, low, high.is_null() ? INFINITY : high.get<double>());
   };
+  base("wheel_base_mm", scene.wheel_base_mm);
+  base("tracked_point_ahead_mm", scene.tracked_ahead_mm);
+  base("tracked_point_left_mm", 0);
   noise("tracker_position_sd_mm", scene.tracker_sd_mm);
   if (scene.heading) noise("tracker_heading_sd_rad", scene.heading_sd_rad);
   noise("factor_variance_s", scene.factor_sd * scene.factor_sd * scene.step_s);
+  if (!scene.effects.empty() && band.empty()) return;
+  base("straight_speed_mm_s", level * scene.straight_mm_s);
+  base("turn_speed_mm_s", level * scene.turn_mm_s);
   for (const json& robot : result.at("robots")) {
     const Wheels<double>& bias = played.individuals.at(robot.at("robot").get<std::size_t>()).bias_mm_s;
-    with_sd("bias_left_mm_s", bias.left, robot.at("bias_left_mm_s"), robot.at("sd_left_mm_s"));
-    with_sd("bias_right_mm_s", bias.right, robot.at("bias_right_mm_s"), robot.at("sd_right_mm_s"));
+    with_sd("bias_left_mm_s", level * bias.left, robot.at("bias_left_mm_s"), robot.at("sd_left_mm_s"));
+    with_sd("bias_right_mm_s", level * bias.right, robot.at("bias_right_mm_s"), robot.at("sd_right_mm_s"));
   }
-  if (!scene.effects.empty()) add_band(kind, scene, out);
-}
-
-void Coverage::add_band(const std::string& kind, const Scene& scene, const std::filesystem::path& out) {
-  const json effects = result_in(out).at("effects");
-  Share points;
-  std::string name;
-  if (effects.size() == 1 && effects[0].at("covariates").size() == 1) {
-    name = effects[0].at("name");
-    const std::string covariate = effects[0].at("covariates")[0];
-    for (const json& band : effects[0].at("parameters").value("bands_95", json::array())) {
-      for (std::size_t i = 0; i < band.at("at").size() && name.starts_with("speed-by-"); ++i) {
-        const std::optional<Situation> at = situation_at(covariate, band.at("at")[i]);
-        const std::optional<double> truth = at ? change_of_speed(scene, *at) : std::nullopt;
-        if (!truth) continue;
-        points.held += band.at("low")[i] <= *truth && *truth <= band.at("high")[i] ? 1 : 0;
-        ++points.all;
-      }
-    }
-  }
-  if (points.all > 0)
-    bands_[kind + ", " + name].push_back(points);
-  else
-    ++without_band_[kind];
 }
 
 void Coverage::print() const {

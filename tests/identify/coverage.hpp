@@ -28,8 +28,6 @@ class Coverage {
     int held = 0, all = 0;
   };
   void add_interval(const std::string& set, const std::string& parameter, double truth, double low, double high);
-  void add_band(const std::string& kind, const Scene&, const std::filesystem::path& out);
-
   std::map<std::string, Share> intervals_;
   /// By scene and effect found: the points of each set's band.
   std::map<std::string, std::vector<Share>> bands_;
