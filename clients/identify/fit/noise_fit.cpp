@@ -263,7 +263,8 @@ class Climb {
   }
 
   using Square = Eigen::Matrix<double, kNoises, kNoises>;
-  /// Which variances move, how many steps, the gain at which the search ends, and the inverse curvature where it starts.
+  /// Settings of a search: the variance that stays (-1: none), the most steps, the gain at which it ends, and the inverse curvature at
+  /// its start.
   struct Search {
     Eigen::Index fixed = -1;
     int most_steps = 20;
@@ -421,7 +422,7 @@ class Climb {
     }
     return sums;
   }
-  /// What the integral over the biases adds to the log likelihood of the model's biases, without a constant.
+  /// The integral over the biases adds this to the log likelihood of the model's biases, up to a constant.
   [[nodiscard]] double over_biases(const std::vector<std::vector<BiasSums>>& of_paths, std::size_t i) const {
     std::vector<BiasSums> robots(biases_->from_prior.size());
     for (std::size_t r = 0; r < robots.size(); ++r) {

@@ -13,7 +13,8 @@ namespace kilotwin::identify {
 [[nodiscard]] Noise most_likely_noise(const MotionModel&, const std::vector<const TrackView*>& tracks,
                                       bool has_headings, std::uint32_t threads);
 
-/// Ends of intervals, and the noise of the largest likelihood among them; NaN where nothing was estimated: contact noise, and measured headings of sets without.
+/// Ends of intervals, and the noise of the largest likelihood. Ends are NaN where nothing was estimated: contact noise, and measured
+/// headings of sets without.
 struct NoiseInterval {
   Noise low, high;
   Noise most_likely;
