@@ -274,7 +274,7 @@ int judge_coverage(const Arguments& arguments, const fs::path& folder) {
   Coverage coverage;
   kilotwin::os::in_parallel(of_kind * kinds.size(), static_cast<std::uint32_t>(arguments.jobs), [&](std::size_t i) {
     const std::string& kind = kinds[i / of_kind];
-    const std::uint64_t seed = arguments.seed * 1000 + i % of_kind;
+    const std::uint64_t seed = arguments.seed * 1000 + i;
     Scene scene = with_drawn_parameters(kind.empty() ? nothing_to_find(seed) : scene_of(arguments, kind), seed);
     if (!kind.empty()) scene.name += fmt::format("-{}", seed);
     const Verdict verdict = try_scene(arguments, scene, seed, 1, folder / scene.name);
