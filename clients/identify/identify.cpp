@@ -158,6 +158,12 @@ Search found_by_search(const Fitter& fitter, const FitState& base, const Measure
   return found;
 }
 
+/// The noise that is written and reported, with its intervals.
+void set_noise(Findings& f, const Fitter& fitter) {
+  f.noise = fitter.noise_interval(f.found.fit);
+  f.found.fit.model.noise = f.noise.most_likely;
+}
+
 /// The last check; then, beside a test set, the refit to all of the training data.
 void choose(Findings& f, const Fitter& fitter, const MeasuredSet& train, const MeasuredSet& whole,
             const Evaluation& evaluation, const ForecastTimes& reported) {
@@ -170,11 +176,14 @@ void choose(Findings& f, const Fitter& fitter, const MeasuredSet& train, const M
     f.check.chose_on_reported = true;
     choose_on_held_out(f, fitter, evaluation, reported);
   }
-  if (&whole == &train) return;
-  f.base = refitted(fitter, f.base, whole);
-  f.found.fit = f.found.fit.model.terms.empty() && f.found.fit.model.base.command_lag_s == 0
-                    ? f.base
-                    : refitted(fitter, f.found.fit, whole);
+  if (&whole != &train) {
+    f.base = refitted(fitter, f.base, whole);
+    f.found.fit = f.found.fit.model.terms.empty() && f.found.fit.model.base.command_lag_s == 0
+                      ? f.base
+                      : refitted(fitter, f.found.fit, whole);
+  }
+  set_noise(f, fitter);
+  if (f.found.fit.model.terms.empty() && f.found.fit.model.base.command_lag_s == 0) f.base = f.found.fit;
 }
 
 /// The errors that are reported.
@@ -184,6 +193,7 @@ void judge(Findings& f, const Fitter& fitter, const Evaluation& evaluation, cons
   // A model that diverges gives no prediction for some rows.
   if (f.after.forecasts.size() != f.before.forecasts.size()) {
     keep_base_model(f);
+    set_noise(f, fitter);
     f.after = f.before;
   }
   if (gives_errors(f.held_out) && f.before.errors.rows == 0) f.held_out = HeldOut::kNoTime;
@@ -236,7 +246,6 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   if (f.numbering.anew()) f.numbering = numbering_of(fitter, f.found.fit);
   assess(f, fitter, train, test, evaluation, reported);
   f.uncertainty = uncertainty_of(fitter, f.found.fit);
-  f.noise = fitter.noise_interval(f.found.fit);
   if (f.found.fit.model.base.command_lag_s != 0) f.command_lag_s = fitter.command_lag_interval(f.found.fit);
   const std::vector<NoiseSample> noise_samples = noise_samples_of(f.found.fit, options.threads);
   f.noise_ratios = noise_ratios_of(noise_samples);

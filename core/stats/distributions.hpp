@@ -1,7 +1,9 @@
 /// Distributions of test statistics.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace kilotwin::stats {
 
@@ -19,5 +21,12 @@ inline constexpr double kNormal95 = 1.96;
 
 /// The value that a t distributed variable exceeds with probability 1 - p.
 [[nodiscard]] double student_quantile(double p, double degrees);
+
+/// 95 % interval of a probability of which `hits` of `trials` independent trials tell (Wilson 1927). trials > 0.
+[[nodiscard]] inline std::pair<double, double> wilson_interval(double hits, double trials) {
+  const double share = hits / trials, z2 = kNormal95 * kNormal95 / trials;
+  const double centre = share + z2 / 2, half = std::sqrt(z2 * (share * (1 - share) + z2 / 4));
+  return {std::max(0.0, (centre - half) / (1 + z2)), std::min(1.0, (centre + half) / (1 + z2))};
+}
 
 }  // namespace kilotwin::stats

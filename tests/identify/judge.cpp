@@ -3,7 +3,7 @@
 // Usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--robots N] [--runs N] [--seconds S]
 //              [--nothing N] [--coverage N] [--rivals] [--jobs N] [--all | SCENE|nothing:SEED...]
 // --all: all scenes, without sets that have no effect.
-// --coverage N: how often the 95 % intervals of N sets hold the true values.
+// --coverage N: how often the 95 % intervals of N sets hold the true values. With scenes: of N sets of each, and their bands.
 // --rivals: other methods on the same scenes, beside it.
 // --robots, --runs and --seconds override a scene's number of robots, number of training runs and their duration.
 #include <fmt/format.h>
@@ -18,15 +18,15 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <map>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "core/os/worker_pool.hpp"
+#include "core/stats/distributions.hpp"
+#include "core/stats/quantiles.hpp"
 #include "tests/identify/comparison.hpp"
-#include "tests/identify/truth/dice.hpp"
+#include "tests/identify/coverage.hpp"
 #include "tests/identify/truth/files.hpp"
 #include "tests/identify/truth/oracle.hpp"
 #include "tests/identify/truth/play.hpp"
@@ -232,27 +232,46 @@ int judge_scenes(const Arguments& arguments, const fs::path& folder) {
   return misses;
 }
 
+/// How many of some sets, with the 95 % interval of the probability.
+std::string share_in_words(int some, int all) {
+  const auto [low, high] = kilotwin::stats::wilson_interval(some, all);
+  return fmt::format("{} of {} sets ({:.1f} %, 95 % interval {:.1f} to {:.1f})", some, all, 100.0 * some / all,
+                     100 * low, 100 * high);
+}
+
 /// Returns the number of sets without effect that had a finding or failed.
 int judge_nothing(const Arguments& arguments, const fs::path& folder) {
-  int alarms = 0;
+  int failed = 0, findings = 0, sentences = 0;
   std::mutex printing;
   std::vector<double> ratios;
-  kilotwin::os::in_parallel(static_cast<std::size_t>(arguments.nothing), static_cast<std::uint32_t>(arguments.jobs),
-                            [&](std::size_t i) {
-                              const std::uint64_t seed = arguments.seed * 1000 + i;
-                              const Scene scene = nothing_to_find(seed);
-                              const Verdict verdict = try_scene(arguments, scene, seed, 20, folder / scene.name);
-                              const std::lock_guard lock(printing);
-                              if (verdict.failure.empty())
-                                ratios.push_back(verdict.later_after_mm / verdict.later_oracle_mm);
-                              if (verdict.failure.empty() && verdict.false_findings.empty()) return;
-                              ++alarms;
-                              print_row(verdict);
-                            });
-  std::sort(ratios.begin(), ratios.end());
-  fmt::print("{} of {} sets without an effect with something found; error over the oracle's, median {:.3f}\n",
-             alarms, arguments.nothing, ratios.empty() ? 0 : ratios[ratios.size() / 2]);
-  return alarms;
+  kilotwin::os::in_parallel(
+      static_cast<std::size_t>(arguments.nothing), static_cast<std::uint32_t>(arguments.jobs), [&](std::size_t i) {
+        const std::uint64_t seed = arguments.seed * 1000 + i;
+        const Scene scene = nothing_to_find(seed);
+        const Verdict verdict = try_scene(arguments, scene, seed, 20, folder / scene.name);
+        const std::lock_guard lock(printing);
+        if (!verdict.failure.empty()) {
+          ++failed;
+          return print_row(verdict);
+        }
+        ratios.push_back(verdict.later_after_mm / verdict.later_oracle_mm);
+        if (!verdict.unexplained.empty()) {
+          ++sentences;
+          fmt::print("{}: {:.3f} of the oracle's error. {}\n", scene.name, ratios.back(), verdict.unexplained);
+        }
+        if (verdict.false_findings.empty()) return;
+        ++findings;
+        print_row(verdict);
+      });
+  const auto sets = static_cast<int>(ratios.size());
+  if (failed > 0) fmt::print("failed: {} of {} sets\n", failed, arguments.nothing);
+  if (sets == 0) return failed;
+  const auto quantile = [&](double share) { return kilotwin::stats::nearest_quantile(ratios, share); };
+  fmt::print("an effect was found: {}\n", share_in_words(findings, sets));
+  fmt::print("a systematic error was reported: {}\n", share_in_words(sentences, sets));
+  fmt::print("error over the oracle's: median {:.3f}, 90 % of sets below {:.3f}, largest {:.3f}\n", quantile(0.5),
+             quantile(0.9), quantile(1));
+  return failed + findings;
 }
 
 /// Identify beside its rivals. Returns the number of scenes in which identify failed.
@@ -272,87 +291,28 @@ int judge_rivals(const Arguments& arguments, const fs::path& folder) {
   return failed;
 }
 
-/// Counts how many 95 % intervals hold the true value, by parameter.
-class Coverage {
- public:
-  void add(const std::string& set, const std::string& parameter, double truth, double value, double sd) {
-    constexpr double kNormal95 = 1.96;
-    add_interval(set, parameter, truth, value - kNormal95 * sd, value + kNormal95 * sd);
-  }
-  /// Prints an interval that lacks the truth.
-  void add_interval(const std::string& set, const std::string& parameter, double truth, double low, double high) {
-    auto& [held, all] = counts_[parameter];
-    const bool holds = low <= truth && truth <= high;
-    if (!holds) fmt::print("{}: {} is {:.6g}, not in {:.6g}..{:.6g}\n", set, parameter, truth, low, high);
-    held += holds ? 1 : 0;
-    ++all;
-  }
-  void print() const {
-    for (const auto& [parameter, count] : counts_) {
-      const auto [held, all] = count;
-      const double share = static_cast<double>(held) / all;
-      fmt::print("{:24} {:5} of {:5} intervals hold the truth: {:.1f} % +- {:.1f}\n", parameter, held, all,
-                 100 * share, 100 * std::sqrt(0.95 * 0.05 / all));
-    }
-  }
-
- private:
-  std::map<std::string, std::pair<int, int>> counts_;
-};
-
-/// Sets whose true parameters are drawn: do the intervals hold them? Returns the number of sets that failed.
+/// Sets whose true parameters are drawn, without an effect or of the scenes: do the intervals hold them? Returns the number of sets
+/// that failed.
 int judge_coverage(const Arguments& arguments, const fs::path& folder) {
+  const std::vector<std::string> kinds = arguments.scenes.empty() ? std::vector<std::string>{""} : arguments.scenes;
+  const auto of_kind = static_cast<std::size_t>(arguments.coverage);
   int failed = 0;
   std::mutex mutex;
   Coverage coverage;
-  kilotwin::os::in_parallel(
-      static_cast<std::size_t>(arguments.coverage), static_cast<std::uint32_t>(arguments.jobs), [&](std::size_t i) {
-        const std::uint64_t seed = arguments.seed * 1000 + i;
-        Scene scene = nothing_to_find(seed);
-        Dice dice(seed ^ 0x636f766572);
-        // From the priors of the fit (fitter.hpp): an interval that contains what a prior leaves open holds the truth often enough
-        // only if the truth varies as the prior says.
-        scene.wheel_base_mm += 2 * dice.normal();
-        scene.straight_mm_s += 1 * dice.normal();
-        scene.turn_mm_s += 2 * dice.normal();
-        scene.bias_mean_mm_s += scene.bias_sd_mm_s / 2 * dice.normal();
-        const Verdict verdict = try_scene(arguments, scene, seed, 1, folder / scene.name);
-        const std::lock_guard lock(mutex);
-        if (!verdict.failure.empty()) {
-          print_row(verdict);
-          ++failed;
-          return;
-        }
-        const Play played = play(scene, seed);
-        std::ifstream in(folder / scene.name / "out" / "result.json");
-        const nlohmann::json result = nlohmann::json::parse(in);
-        const auto base = [&](const char* parameter, double truth) {
-          coverage.add(scene.name, parameter, truth, result.at("base").at(parameter).get<double>(),
-                       result.at("base_sd").at(parameter).get<double>());
-        };
-        base("straight_speed_mm_s", scene.straight_mm_s);
-        base("turn_speed_mm_s", scene.turn_mm_s);
-        base("wheel_base_mm", scene.wheel_base_mm);
-        base("tracked_point_ahead_mm", scene.tracked_ahead_mm);
-        base("tracked_point_left_mm", 0);
-        const auto noise = [&](const char* parameter, double truth) {
-          const nlohmann::json &low = result.at("noise_low").at(parameter),
-                               &high = result.at("noise_high").at(parameter);
-          // Null: a variance that may be as large as any.
-          coverage.add_interval(scene.name, parameter, truth, low.get<double>(),
-                                high.is_null() ? INFINITY : high.get<double>());
-        };
-        noise("tracker_position_sd_mm", scene.tracker_sd_mm);
-        if (scene.heading) noise("tracker_heading_sd_rad", scene.heading_sd_rad);
-        noise("factor_variance_s", scene.factor_sd * scene.factor_sd * scene.step_s);
-        for (const nlohmann::json& robot : result.at("robots")) {
-          const Wheels<double>& bias = played.individuals.at(robot.at("robot").get<std::size_t>()).bias_mm_s;
-          coverage.add(scene.name, "bias_left_mm_s", bias.left, robot.at("bias_left_mm_s"),
-                       robot.at("sd_left_mm_s"));
-          coverage.add(scene.name, "bias_right_mm_s", bias.right, robot.at("bias_right_mm_s"),
-                       robot.at("sd_right_mm_s"));
-        }
-      });
+  kilotwin::os::in_parallel(of_kind * kinds.size(), static_cast<std::uint32_t>(arguments.jobs), [&](std::size_t i) {
+    const std::string& kind = kinds[i / of_kind];
+    const std::uint64_t seed = arguments.seed * 1000 + i;
+    Scene scene = with_drawn_parameters(kind.empty() ? nothing_to_find(seed) : scene_of(arguments, kind), seed);
+    if (!kind.empty()) scene.name += fmt::format("-{}", seed);
+    const Verdict verdict = try_scene(arguments, scene, seed, 1, folder / scene.name);
+    const std::lock_guard lock(mutex);
+    if (!verdict.failure.empty()) {
+      print_row(verdict);
+      ++failed;
+      return;
+    }
+    coverage.add(kind, scene, play(scene, seed), folder / scene.name / "out");
+  });
   coverage.print();
   return failed;
 }
@@ -403,7 +363,7 @@ int main(int argc, char** argv) {
     }
     const Folder folder(arguments.keep);
     bool good = true;
-    if (!arguments.scenes.empty())
+    if (!arguments.scenes.empty() && arguments.coverage == 0)
       good = (arguments.rivals ? judge_rivals : judge_scenes)(arguments, folder.path()) == 0;
     if (arguments.coverage > 0) good = judge_coverage(arguments, folder.path()) == 0 && good;
     // With few sets the bound is below one: then no finding is allowed.

@@ -144,6 +144,36 @@ TEST(NoiseInterval, HoldsTheTruth) {
   EXPECT_TRUE(std::isnan(interval.low.wall_mm2_s)) << "contact noise has no interval";
 }
 
+TEST(NoiseInterval, OfTheFactorHoldsTheTruthWhereOtherNoiseMayBeNone) {
+  // The true noise is that of the factor alone, under a tracker that hides most of it. Wheel noise explains nearly the same, so that
+  // the estimate shares the noise between both. The interval must reach the share without wheel noise. The fit's own estimate, with
+  // biases as known, is 0.69 of the truth on average.
+  truth::Scene scene = small({});
+  scene.robots = 6;
+  scene.width_mm = scene.height_mm = 0;
+  scene.tracker_sd_mm = 1.1;
+  scene.factor_sd = 0.1;
+  scene.heading_sd_rad = 0.08;
+  const double truth_s = scene.factor_sd * scene.factor_sd * scene.step_s;
+  constexpr int kSets = 8;
+  int held = 0;
+  double sum_s = 0;
+  for (std::uint64_t seed = 1; seed <= kSets; ++seed) {
+    const MeasuredSet set = set_of(scene, played(scene, seed));
+    const Fitter fitter(set, 2);
+    FitState state(set);
+    fitter.fit_base(state);
+    const NoiseInterval interval = fitter.noise_interval(state);
+    held += interval.low.factor_s <= truth_s && truth_s <= interval.high.factor_s ? 1 : 0;
+    sum_s += interval.most_likely.factor_s;
+    EXPECT_LT(interval.high.factor_s, 2 * truth_s) << seed << ": the interval says something";
+    EXPECT_LE(interval.low.factor_s, interval.most_likely.factor_s) << seed;
+    EXPECT_GE(interval.high.factor_s, interval.most_likely.factor_s) << seed;
+  }
+  EXPECT_GE(held, kSets - 1);
+  EXPECT_NEAR(sum_s / kSets, truth_s, 0.15 * truth_s);
+}
+
 TEST(Uncertainty, OfTheBaseSpeedContainsThatOfTheMeanBias) {
   const Fitted f(small({}));
   const Uncertainty u = uncertainty_of(f.fitter, f.state);

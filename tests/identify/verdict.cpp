@@ -103,6 +103,8 @@ void judge_causes(const Scene& scene, const json& result, Verdict& verdict) {
     }
     if (!related) verdict.false_findings.push_back(text);
   }
+  const json left = result.value("unexplained", json::object());
+  if (left.value("large", false)) verdict.unexplained = left.at("in_words");
   std::vector<bool> caught(scene.faults.size());
   for (const json& found : result.value("faults", json::array())) {
     bool real = false;

@@ -98,6 +98,17 @@ TEST_F(VerdictTest, AFaultIsNamedByKindRunAndRobot) {
   EXPECT_FALSE(of(scene, 3, 3, R"({"effects": []})").good());
 }
 
+TEST_F(VerdictTest, ASystematicErrorIsKeptWithItsSentence) {
+  const auto sentence = [&](const char* large) {
+    return of(scenario("nothing-tidy"), 3, 3,
+              fmt::format(R"({{"effects": [], "unexplained": {{"large": {}, "in_words": "Much is left."}}}})",
+                          large))
+        .unexplained;
+  };
+  EXPECT_EQ(sentence("true"), "Much is left.");
+  EXPECT_EQ(sentence("false"), "");
+}
+
 TEST_F(VerdictTest, FilesThatLackSomethingAreSaidToFail) {
   EXPECT_NE(of(scenario("fatigue"), 3, 3, "{").failure, "");
   EXPECT_NE(of(scenario("fatigue"), 3, 3, "{}").failure, "");

@@ -1,16 +1,20 @@
 #include "clients/identify/fit/noise_fit.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <utility>
 
 #include "clients/identify/fit/linearisation.hpp"
 #include "clients/identify/fit/profile.hpp"
 #include "core/os/worker_pool.hpp"
+#include "core/stats/distributions.hpp"
+#include "core/stats/moments.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -19,21 +23,23 @@ namespace {
 enum : Eigen::Index { kFactor, kWheel, kHeading, kDrift, kPosition, kMeasuredHeading, kNoises };
 constexpr std::size_t kSpreading = kPosition;
 using NoiseVector = Eigen::Matrix<double, kNoises, 1>;
+using PoseByBias = Eigen::Matrix<double, 3, 2>;
+
+/// A lower variance has no influence.
+constexpr std::array<double, kNoises> kLeast = {1e-6, 1e-4, 1e-8, 1e-6, 1e-4, 1e-6};
 
 NoiseVector logs_of(const Noise& n) {
   NoiseVector v;
   v << n.factor_s, n.wheel_mm2_s, n.heading_rad2_s, n.drift_mm2_s, n.position_mm2, n.heading_rad2;
   return v.array().log();
 }
-/// Variances within bounds. Below the lower bound a variance has no influence; above the upper bound it hides
-/// everything.
+/// Variances within bounds. Above the upper bound a variance hides everything.
 NoiseVector variances(const NoiseVector& logs) {
-  constexpr std::array<double, kNoises> kLow = {1e-6, 1e-4, 1e-8, 1e-6, 1e-4, 1e-6},
-                                        kHigh = {1, 100, 1, 100, 1e4, 10};
+  constexpr std::array<double, kNoises> kMost = {1, 100, 1, 100, 1e4, 10};
   NoiseVector v;
   for (Eigen::Index i = 0; i < kNoises; ++i) {
     const auto k = static_cast<std::size_t>(i);
-    v[i] = std::clamp(std::exp(logs[i]), kLow[k], kHigh[k]);
+    v[i] = std::clamp(std::exp(logs[i]), kLeast[k], kMost[k]);
   }
   return v;
 }
@@ -53,10 +59,13 @@ struct FilterInterval {
     for (Eigen::Matrix3d& m : spread) m.setZero();
   }
   Eigen::Matrix3d transition = Eigen::Matrix3d::Identity();  ///< of the pose
+  /// By how much the pose at the end moves with the biases in this interval.
+  PoseByBias by_bias = PoseByBias::Zero();
   /// Process noise covariance per unit of each variance, and the part that is not fitted.
   std::array<Eigen::Matrix3d, kSpreading> spread;
   Eigen::Matrix3d more = Eigen::Matrix3d::Zero();
   // The measurement at the end of the interval.
+  double time_s = 0;
   int size = 0;
   Eigen::Matrix3d jacobian = Eigen::Matrix3d::Zero();
   /// Innovation along the path, and the correction that it applied.
@@ -79,7 +88,7 @@ class Recorder {
   void step(const StepRecord& record) {
     in_contact_ = in_contact_ || record.in_contact();
     const StepJacobian ways = step_jacobian(record, wheel_base_mm_);
-    const auto carry = [&](Eigen::Matrix3d& m) {
+    const auto carry = [&](auto& m) {
       m.row(0) += ways.by_heading[0] * m.row(2);
       m.row(1) += ways.by_heading[1] * m.row(2);
     };
@@ -89,6 +98,7 @@ class Recorder {
       m.col(1) += ways.by_heading[1] * m.col(2);
     };
     carry(now_.transition);
+    carry(now_.by_bias);
     for (Eigen::Matrix3d& m : now_.spread) carry_covariance(m);
     carry_covariance(now_.more);
     const double h = record.h_s;
@@ -96,12 +106,15 @@ class Recorder {
     now_.spread[kDrift](1, 1) += h;
     now_.more(2, 2) += TrackFilter::kLeastTurn_rad2_s * h;
     if (!record.middle.commands.driven()) return;
+    now_.by_bias +=
+        h * ways.by_wheel * Eigen::Vector2d(record.rates.left_gain, record.rates.right_gain).asDiagonal();
     now_.spread[kFactor] +=
         ways.by_wheel * (h * record.rates.driven_mm_s().cwiseAbs2()).asDiagonal() * ways.by_wheel.transpose();
     now_.spread[kWheel] += h * ways.by_wheel * ways.by_wheel.transpose();
     now_.spread[kHeading](2, 2) += h;
   }
-  void update(const Innovation& innovation, const Sample&) {
+  void update(const Innovation& innovation, const Sample& sample) {
+    now_.time_s = sample.time_s;
     now_.size = innovation.size;
     now_.jacobian = innovation.jacobian;
     now_.difference = innovation.difference;
@@ -127,6 +140,13 @@ struct Path {
   Eigen::Matrix3d first;
   double position_mm2;  ///< part of `first`
   std::vector<FilterInterval> stretches;
+  std::uint32_t robot;
+};
+
+/// Score and information of a robot's biases.
+struct BiasSums {
+  Eigen::Vector2d score = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
 };
 
 Path path_of(const MotionModel& model, const TrackView& view) {
@@ -135,20 +155,24 @@ Path path_of(const MotionModel& model, const TrackView& view) {
   TrackFilter filter(model, bias, view.track->robot, view.number);
   Recorder recorder(model.base.wheel_base_mm);
   run_filter(filter, view, view.track->samples.size(), recorder);
-  return {recorder.first, model.noise.position_mm2, std::move(recorder.stretches)};
+  return {recorder.first, model.noise.position_mm2, std::move(recorder.stretches), view.track->robot};
 }
 
-/// Log likelihood of a path's measurements under other variances.
-double log_likelihood(const Path& path, const NoiseVector& variance) {
+/// Log likelihood of a path's measurements under other variances, and about the model's biases. each(time, value): of each
+/// measurement.
+template <class Each>
+double log_likelihood(const Path& path, const NoiseVector& variance, BiasSums* biases, Each&& each) {
   double sum = 0;
   Eigen::Matrix3d p = path.first;
   p(0, 0) += variance[kPosition] - path.position_mm2;
   p(1, 1) += variance[kPosition] - path.position_mm2;
   Eigen::Vector3d off = Eigen::Vector3d::Zero();  // of the mean from the path
+  PoseByBias by_bias = PoseByBias::Zero();
   for (const FilterInterval& s : path.stretches) {
     if (!s.counts) {
       p = s.covariance;
       off.setZero();
+      by_bias.setZero();
       continue;
     }
     off = (s.transition * off).eval();
@@ -165,14 +189,40 @@ double log_likelihood(const Path& path, const NoiseVector& variance) {
     Eigen::Matrix3d inverse = seen.inverse();
     const double distance2 = difference.dot(inverse * difference);
     const double factor = outlier_factor(distance2, s.size);
-    sum += std::max(-1e3, -0.5 * (std::log(seen.determinant()) + s.size * std::log(factor) + distance2 / factor));
+    const double value =
+        std::max(-1e3, -0.5 * (std::log(seen.determinant()) + s.size * std::log(factor) + distance2 / factor));
+    sum += value;
+    each(s.time_s, value);
     inverse /= factor;
     const Eigen::Matrix3d gain = ph * inverse;
+    if (biases != nullptr) {
+      by_bias = (s.transition * by_bias + s.by_bias).eval();
+      PoseByBias seen_by_bias = s.jacobian * by_bias;
+      if (s.size < 3) seen_by_bias.row(2).setZero();
+      biases->score.noalias() += seen_by_bias.transpose() * (inverse * difference);
+      biases->information.noalias() += seen_by_bias.transpose() * inverse * seen_by_bias;
+      by_bias.noalias() -= gain * seen_by_bias;
+    }
     off += gain * difference - s.correction;
     p.noalias() -= gain * ph.transpose();
     p = (0.5 * (p + p.transpose())).eval();
   }
   return sum;
+}
+
+double log_likelihood(const Path& path, const NoiseVector& variance, BiasSums* biases) {
+  return log_likelihood(path, variance, biases, [](double, double) {});
+}
+
+/// Log likelihood by stretches of a path that hardly depend on each other.
+std::vector<double> by_stretches(const Path& path, const NoiseVector& variance) {
+  constexpr double kStretch_s = 20;
+  std::map<double, double> sums;
+  log_likelihood(path, variance, nullptr,
+                 [&](double time_s, double value) { sums[std::floor(time_s / kStretch_s)] += value; });
+  std::vector<double> out;
+  for (const auto& [stretch, sum] : sums) out.push_back(sum);
+  return out;
 }
 
 /// Weak prior about the start: bounds the search where the data say nothing.
@@ -182,24 +232,74 @@ double log_prior(const NoiseVector& logs) {
   return -0.5 * kWeak * (logs - middle).squaredNorm();
 }
 
-/// Quasi-Newton maximisation (BFGS) over the logarithms of the variances.
+/// The biases of the robots, which are integrated over: what they can follow is no noise.
+struct Biases {
+  double precision = 0;                     ///< of their prior
+  std::vector<std::size_t> robot_of_path;   ///< index in `from_prior`
+  std::vector<Eigen::Vector2d> from_prior;  ///< prior mean less the model's value, by robot
+};
+
+Biases biases_of(const MotionModel& model, const std::vector<Path>& paths) {
+  Biases out;
+  out.precision = 1 / (model.base.bias_sd_mm_s * model.base.bias_sd_mm_s);
+  std::map<std::uint32_t, std::size_t> places;
+  for (const Path& path : paths) {
+    const auto [at, is_new] = places.emplace(path.robot, places.size());
+    if (is_new)
+      out.from_prior.emplace_back(Eigen::Vector2d::Constant(model.base.bias_mean_mm_s) -
+                                  model.bias_of(path.robot).mean_mm_s);
+    out.robot_of_path.push_back(at->second);
+  }
+  return out;
+}
+
+/// Maximisation of a likelihood over the logarithms of the variances. With `biases` it is the marginal likelihood over them, in
+/// Laplace's approximation; without, they are known.
 class Climb {
  public:
-  Climb(const std::vector<Path>& paths, bool has_headings, std::uint32_t threads)
-      : paths_(paths), has_headings_(has_headings), threads_(threads) {
+  Climb(const std::vector<Path>& paths, const Biases* biases, bool has_headings, std::uint32_t threads)
+      : paths_(paths), biases_(biases), has_headings_(has_headings), threads_(threads) {
     for (const Path& path : paths) samples_ += path.stretches.size();
   }
 
-  /// Moves to the maximum and returns the value there.
-  double operator()(NoiseVector& at) const {
-    double value = values({at}).front();
-    NoiseVector gradient = gradient_at(at);
+  using Square = Eigen::Matrix<double, kNoises, kNoises>;
+  /// Settings of a search: the variance that stays (-1: none), the most steps, the gain at which it ends, and the inverse curvature at
+  /// its start.
+  struct Search {
+    Eigen::Index fixed = -1;
+    int most_steps = 20;
+    double settled = 0.3;
+    Square inverse = Square::Zero();
+  };
+  [[nodiscard]] Search from_afar() const {
     // A log variance from n samples has the standard deviation sqrt(2 / n).
-    const double curvature = std::max<double>(10, 0.1 * static_cast<double>(samples_));
-    using Square = Eigen::Matrix<double, kNoises, kNoises>;
-    Square inverse = Square::Identity() / curvature;
-    for (int pass = 0; pass < 20; ++pass) {
-      NoiseVector move = inverse * gradient;
+    Search search;
+    search.inverse = Square::Identity() / std::max<double>(10, 0.1 * static_cast<double>(samples_));
+    return search;
+  }
+  /// With the negative second derivatives `curvature` near the maximum.
+  [[nodiscard]] Search from_near(const Eigen::MatrixXd& curvature, Eigen::Index fixed) const {
+    constexpr double kFlattest = 0.5, kSettled = 0.02;
+    Search search{fixed, 8, kSettled, Square::Zero()};
+    Eigen::MatrixXd others = curvature;
+    if (fixed >= 0) {
+      others.row(fixed).setZero();
+      others.col(fixed).setZero();
+    }
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(others);
+    const Eigen::VectorXd inverse = parts.eigenvalues().cwiseMax(kFlattest).cwiseInverse();
+    search.inverse.topLeftCorner(size(), size()) =
+        parts.eigenvectors() * inverse.asDiagonal() * parts.eigenvectors().transpose();
+    return search;
+  }
+
+  /// Moves to the maximum by quasi-Newton steps (BFGS), and returns the value there.
+  double operator()(NoiseVector& at, Search search) const {
+    double value = values({at}).front();
+    NoiseVector gradient = gradient_at(at, value, search.fixed);
+    for (int step = 0; step < search.most_steps; ++step) {
+      NoiseVector move = search.inverse * gradient;
+      if (search.fixed >= 0) move[search.fixed] = 0;
       const double longest = move.cwiseAbs().maxCoeff();
       if (longest > 1.5) move *= 1.5 / longest;
       bool better = false;
@@ -214,13 +314,13 @@ class Climb {
       }
       if (!better) break;
       at += move;
-      if (gained < 0.3) break;
-      const NoiseVector next = gradient_at(at);
+      if (gained < search.settled) break;
+      const NoiseVector next = gradient_at(at, value, search.fixed);
       const NoiseVector change = gradient - next;  // of the negative objective
       const double along = change.dot(move);
       if (along > 1e-9) {
         const Square side = Square::Identity() - move * change.transpose() / along;
-        inverse = (side * inverse * side.transpose() + move * move.transpose() / along).eval();
+        search.inverse = (side * search.inverse * side.transpose() + move * move.transpose() / along).eval();
       }
       gradient = next;
     }
@@ -253,6 +353,52 @@ class Climb {
     return out;
   }
 
+  /// By which factor the drop at the ends of an interval exceeds that of a perfect model and of many data. The scores of stretches
+  /// along a direction may vary more than the curvature expects (Kent 1982), and few stretches tell little.
+  [[nodiscard]] double widening(const NoiseVector& at, const NoiseVector& along) const {
+    constexpr double kStep = 0.05;
+    constexpr double kFewest = 8;
+    const NoiseVector up = variances(at + kStep * along), down = variances(at - kStep * along);
+    stats::Moments scores;
+    for (const Path& path : paths_) {
+      const std::vector<double> higher = by_stretches(path, up), lower = by_stretches(path, down);
+      for (std::size_t k = 0; k < higher.size(); ++k) scores.add((higher[k] - lower[k]) / (2 * kStep));
+    }
+    const std::vector<double> three = values({at + kStep * along, at, at - kStep * along});
+    const double curvature = (2 * three[1] - three[0] - three[2]) / (kStep * kStep);
+    const auto count = static_cast<double>(scores.count());
+    const double of_scores = count * scores.standard_deviation() * scores.standard_deviation();
+    const double dispersion = count < kFewest || curvature <= 0 ? 1 : std::max(1.0, of_scores / curvature);
+    const double wider = stats::student_quantile(0.975, std::max(kFewest, count) - 1) / stats::kNormal95;
+    return dispersion * wider * wider;
+  }
+
+  /// How far variance `i` moves along `ridge`, in its logarithm, until the profile log likelihood is `most_drop` below `value`.
+  /// `ridge`: about how the others follow.
+  [[nodiscard]] double profile_end(const NoiseVector& best, double value, Eigen::Index i, const NoiseVector& ridge,
+                                   const Eigen::MatrixXd& curvature, double most_drop) const {
+    // By factors of e: beyond, the variance hides everything or has no influence.
+    constexpr double kFarthest = 9;
+    const double along = std::abs(curvature.row(i).dot(ridge.head(size())));
+    const double first = std::clamp(std::sqrt(2 * most_drop / std::max(along, 1e-3)), 0.02, 3.0);
+    const Search others = from_near(curvature, i);
+    // The others start from the nearest point that is known.
+    std::map<double, NoiseVector> known{{0, best}};
+    const auto drop = [&](double far) {
+      auto near = known.lower_bound(far);
+      if (near == known.end() || (near != known.begin() && far - std::prev(near)->first < near->first - far))
+        --near;
+      NoiseVector at = near->second;
+      const NoiseVector moved = at + (far - near->first) * ridge;
+      at[i] = moved[i];
+      if (this->value(moved) > this->value(at)) at = moved;
+      const double found = (*this)(at, others);
+      known[far] = at;
+      return value - found;
+    };
+    return profile_distance(drop, first, kFarthest, most_drop);
+  }
+
   /// Number of variances that these data have.
   [[nodiscard]] Eigen::Index size() const { return has_headings_ ? kNoises : kMeasuredHeading; }
 
@@ -261,36 +407,56 @@ class Climb {
     std::vector<NoiseVector> variance;
     for (const NoiseVector& logs : at) variance.push_back(variances(logs));
     std::vector<std::vector<double>> of_paths(paths_.size(), std::vector<double>(at.size()));
+    std::vector<std::vector<BiasSums>> sums_of_paths(biases_ != nullptr ? paths_.size() : 0,
+                                                     std::vector<BiasSums>(at.size()));
     os::in_parallel(paths_.size(), threads_, [&](std::size_t p) {
-      for (std::size_t i = 0; i < at.size(); ++i) of_paths[p][i] = log_likelihood(paths_[p], variance[i]);
+      for (std::size_t i = 0; i < at.size(); ++i)
+        of_paths[p][i] =
+            log_likelihood(paths_[p], variance[i], biases_ != nullptr ? &sums_of_paths[p][i] : nullptr);
     });
     std::vector<double> sums(at.size());
     for (std::size_t i = 0; i < at.size(); ++i) {
       for (const std::vector<double>& of_path : of_paths) sums[i] += of_path[i];
-      sums[i] += log_prior(at[i]);
+      // The prior of the search would hold a variance that may be 0 near its usual value.
+      sums[i] += biases_ != nullptr ? over_biases(sums_of_paths, i) : log_prior(at[i]);
     }
     return sums;
   }
-  [[nodiscard]] NoiseVector gradient_at(const NoiseVector& at) const {
-    constexpr double kStep = 0.02;
-    const Eigen::Index count = size();
+  /// The integral over the biases adds this to the log likelihood of the model's biases, up to a constant.
+  [[nodiscard]] double over_biases(const std::vector<std::vector<BiasSums>>& of_paths, std::size_t i) const {
+    std::vector<BiasSums> robots(biases_->from_prior.size());
+    for (std::size_t r = 0; r < robots.size(); ++r) {
+      robots[r].score = biases_->precision * biases_->from_prior[r];
+      robots[r].information.diagonal().setConstant(biases_->precision);
+    }
+    for (std::size_t p = 0; p < of_paths.size(); ++p) {
+      robots[biases_->robot_of_path[p]].score += of_paths[p][i].score;
+      robots[biases_->robot_of_path[p]].information += of_paths[p][i].information;
+    }
+    double sum = 0;
+    for (const BiasSums& robot : robots)
+      sum += 0.5 * (robot.score.dot(robot.information.inverse() * robot.score) -
+                    std::log(robot.information.determinant()));
+    return sum;
+  }
+  [[nodiscard]] NoiseVector gradient_at(const NoiseVector& at, double value, Eigen::Index fixed) const {
+    constexpr double kStep = 1e-3;
     std::vector<NoiseVector> trials;
-    for (Eigen::Index i = 0; i < count; ++i) {
-      for (const double by : {kStep, -kStep}) {
-        trials.push_back(at);
-        trials.back()[i] += by;
-      }
+    for (Eigen::Index i = 0; i < size(); ++i) {
+      if (i == fixed) continue;
+      trials.push_back(at);
+      trials.back()[i] += kStep;
     }
     const std::vector<double> found = values(trials);
     NoiseVector gradient = NoiseVector::Zero();
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const auto k = static_cast<std::size_t>(2 * i);
-      gradient[i] = (found[k] - found[k + 1]) / (2 * kStep);
-    }
+    auto next = found.begin();
+    for (Eigen::Index i = 0; i < size(); ++i)
+      if (i != fixed) gradient[i] = (*next++ - value) / kStep;
     return gradient;
   }
 
   const std::vector<Path>& paths_;
+  const Biases* biases_;
   const bool has_headings_;
   const std::uint32_t threads_;
   std::size_t samples_ = 0;
@@ -324,27 +490,39 @@ NoiseVector along_ridge(const Eigen::MatrixXd& curvature, Eigen::Index i) {
 NoiseInterval noise_interval(const MotionModel& model, const std::vector<const TrackView*>& tracks,
                              bool has_headings, std::uint32_t threads) {
   const std::vector<Path> paths = paths_of(model, tracks, threads);
-  const Climb climb(paths, has_headings, threads);
+  const Biases biases = biases_of(model, paths);
+  const Climb climb(paths, &biases, has_headings, threads);
   NoiseVector best = logs_of(model.noise);
-  const double value = climb(best);
+  climb(best, climb.from_afar());
   const Eigen::MatrixXd curvature = climb.curvature(best);
+  double value = climb(best, climb.from_near(curvature, -1));
+  // By how much the likelihood falls if one process noise is none.
+  NoiseVector without = NoiseVector::Constant(INFINITY);
+  for (Eigen::Index i = 0; i < kPosition; ++i) {
+    NoiseVector at = best;
+    at[i] = std::log(kLeast[static_cast<std::size_t>(i)]);
+    const double found = climb(at, climb.from_near(curvature, i));
+    if (found > value) best = at;
+    value = std::max(value, found);
+    without[i] = value - found;
+  }
   NoiseVector low = NoiseVector::Constant(NAN), high = low;
   for (Eigen::Index i = 0; i < climb.size(); ++i) {
-    // By factors of e: beyond, the variance hides everything or has no influence.
-    constexpr double kFirst = 0.1, kFarthest = 9;
     const NoiseVector ridge = along_ridge(curvature, i);
+    bool others_at_bound = false;
+    for (Eigen::Index j = 0; j < kPosition; ++j)
+      others_at_bound = others_at_bound || (j != i && without[j] < kProfileDrop95);
+    const double most_drop =
+        (others_at_bound ? kProfileDropAtBound95 : kProfileDrop95) * climb.widening(best, ridge);
     const auto end = [&](double sign) {
-      return std::exp(
-          best[i] +
-          sign * profile_distance([&](double far) { return value - climb.value(best + sign * far * ridge); },
-                                  kFirst, kFarthest));
+      return std::exp(best[i] + sign * climb.profile_end(best, value, i, sign * ridge, curvature, most_drop));
     };
-    low[i] = end(-1);
+    low[i] = without[i] < most_drop ? 0 : end(-1);
     high[i] = end(1);
   }
   Noise unknown;
   unknown.wall_mm2_s = unknown.wall_rad2_s = unknown.contact_mm2_s = unknown.contact_rad2_s = NAN;
-  return {with(unknown, low), with(unknown, high)};
+  return {with(unknown, low), with(unknown, high), with(model.noise, variances(best))};
 }
 
 Noise most_likely_noise(const MotionModel& start, const std::vector<const TrackView*>& tracks, bool has_headings,
@@ -354,10 +532,10 @@ Noise most_likely_noise(const MotionModel& start, const std::vector<const TrackV
   constexpr double kSettled = 0.1;  // in the logarithm; the paths are then consistent with the variances
   for (int round = 0; round < kMostRounds; ++round) {
     const std::vector<Path> paths = paths_of(model, tracks, threads);
-    const Climb climb(paths, has_headings, threads);
+    const Climb climb(paths, nullptr, has_headings, threads);
     const NoiseVector before = logs_of(model.noise);
     NoiseVector at = before;
-    const double value = climb(at);
+    const double value = climb(at, climb.from_afar());
     // A variance near zero has no gradient. A restart at a larger value tests whether it should be larger.
     constexpr double kNone_mm2 = 0.01, kNone_s = 1e-5;
     if (std::exp(at[kPosition]) < kNone_mm2 || std::exp(at[kFactor]) < kNone_s) {
@@ -366,7 +544,7 @@ Noise most_likely_noise(const MotionModel& start, const std::vector<const TrackV
       restart[kFactor] = std::max(at[kFactor], middle[kFactor]);
       restart[kDrift] = std::min(at[kDrift], std::log(1e-2));
       restart[kPosition] = std::max(at[kPosition], std::log(0.1));
-      if (climb(restart) > value) at = restart;
+      if (climb(restart, climb.from_afar()) > value) at = restart;
     }
     model.noise = with(model.noise, variances(at));
     if ((at - before).cwiseAbs().maxCoeff() < kSettled) break;

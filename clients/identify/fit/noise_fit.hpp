@@ -13,12 +13,15 @@ namespace kilotwin::identify {
 [[nodiscard]] Noise most_likely_noise(const MotionModel&, const std::vector<const TrackView*>& tracks,
                                       bool has_headings, std::uint32_t threads);
 
-/// Ends of intervals; NaN where nothing was estimated: contact noise, and measured headings of sets without.
+/// Ends of intervals, and the noise of the largest likelihood. Ends are NaN where nothing was estimated: contact noise, and measured
+/// headings of sets without.
 struct NoiseInterval {
   Noise low, high;
+  Noise most_likely;
 };
 
-/// 95 % intervals by profile likelihood about the fitted noise. A variance that may as well be 0 has the end 0.
+/// 95 % intervals by profile likelihood. The likelihood is integrated over the biases, which the fit adapts to the noise. A variance
+/// that may as well be 0 has the end 0.
 [[nodiscard]] NoiseInterval noise_interval(const MotionModel&, const std::vector<const TrackView*>& tracks,
                                            bool has_headings, std::uint32_t threads);
 

@@ -9,19 +9,24 @@ namespace kilotwin::identify {
 /// By which the profile log likelihood falls at the ends of a 95 % interval: half the quantile of chi-squared with one degree.
 inline constexpr double kProfileDrop95 = 1.92;
 
-/// The distance from the maximum at which a log likelihood has fallen by kProfileDrop95. `drop(distance)`: by which it has fallen;
+/// The same where another parameter may be at its bound: an upper bound of the statistic's distribution is then the mixture of
+/// chi-squared with one and with two degrees in equal shares (Self and Liang 1987).
+inline constexpr double kProfileDropAtBound95 = 2.57;
+
+/// The distance from the maximum at which a log likelihood has fallen by `most`. `drop(distance)`: by which it has fallen;
 /// `first`: where the search starts. Infinite if it has not fallen so far at `farthest`.
-template <class Drop> double profile_distance(Drop&& drop, double first, double farthest) {
+template <class Drop>
+double profile_distance(Drop&& drop, double first, double farthest, double most = kProfileDrop95) {
   constexpr int kMostTries = 12;
-  constexpr double kNear = 0.15;  // of the drop, nat: 4 % of the distance
+  const double near = 0.08 * most;  // 4 % of the distance
   double inside = 0, outside = INFINITY, at = std::min(first, farthest);
   for (int n = 0; n < kMostTries; ++n) {
     const double fallen = std::max(drop(at), 0.0);
-    if (std::abs(fallen - kProfileDrop95) < kNear) return at;
-    (fallen < kProfileDrop95 ? inside : outside) = at;
+    if (std::abs(fallen - most) < near) return at;
+    (fallen < most ? inside : outside) = at;
     if (inside >= farthest) return INFINITY;
     // The drop of a parabola, within four times the distance and between the known points.
-    double next = at * std::sqrt(kProfileDrop95 / std::max(fallen, kProfileDrop95 / 16));
+    double next = at * std::sqrt(most / std::max(fallen, most / 16));
     if (!(next > inside) || !(next < outside)) next = std::isfinite(outside) ? (inside + outside) / 2 : 2 * at;
     at = std::min(next, farthest);
   }

@@ -17,6 +17,8 @@
 #include "clients/report/plot.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
+#include "core/random/random.hpp"
+#include "core/stats/moments.hpp"
 #include "core/stats/quantiles.hpp"
 #include "idl/model.pb.h"
 
@@ -71,6 +73,12 @@ class Loop {
   void fit_wander();
   [[nodiscard]] LinkModel::Timing drawn() const;
   void draw_population();
+  /// Reception of drawn swarms in the grid of set `q`, by displacement class; radio_of(k): of swarm k.
+  template <class RadioOf>
+  [[nodiscard]] std::vector<std::vector<double>> reception_of_swarms(std::size_t q, RadioOf&& radio_of) const;
+  /// The placement that model.txtpb has.
+  [[nodiscard]] const LinkModel::Swarm& steadiest() const;
+  void write_placements() const;
   /// Returns the model of the population.
   [[nodiscard]] proto::Model write_models() const;
   [[nodiscard]] identification::RadioFit result() const;
@@ -374,18 +382,24 @@ LinkModel::Timing Loop::drawn() const {
   return timing;
 }
 
+template <class RadioOf>
+std::vector<std::vector<double>> Loop::reception_of_swarms(std::size_t q, RadioOf&& radio_of) const {
+  std::vector<std::vector<double>> drawn(statistics(test_[q]).classes.size());
+  for (int k = 0; k < options_.swarms; ++k) {
+    GridSet one = train_[q];
+    one.runs = {simulate(train_[q], radio_of(k), kFirstSwarm + static_cast<std::uint64_t>(k))};
+    const Statistics s = statistics(one);
+    for (std::size_t c = 0; c < drawn.size(); ++c) drawn[c].push_back(s.classes[c].reception);
+  }
+  return drawn;
+}
+
 /// Predictive check with new robots: is the measured set typical of the population?
 void Loop::draw_population() {
   for (std::size_t q = 0; q < train_.size(); ++q) {
     const proto::Radio radio = model_.population(model_.swarms[q], drawn());
     const Statistics real = statistics(test_[q]);
-    std::vector<std::vector<double>> drawn(real.classes.size());
-    for (int k = 0; k < options_.swarms; ++k) {
-      GridSet one = train_[q];
-      one.runs = {simulate(train_[q], radio, kFirstSwarm + static_cast<std::uint64_t>(k))};
-      const Statistics s = statistics(one);
-      for (std::size_t c = 0; c < drawn.size(); ++c) drawn[c].push_back(s.classes[c].reception);
-    }
+    std::vector<std::vector<double>> drawn = reception_of_swarms(q, [&](int) { return radio; });
     for (std::size_t c = 0; c < drawn.size(); ++c) {
       const auto at = [&](double share) { return stats::nearest_quantile(drawn[c], share); };
       const DisplacementClass& is = real.classes[c];
@@ -401,6 +415,12 @@ void Loop::draw_population() {
       row.set_inside(is.reception >= row.low() - 1e-9 && is.reception <= row.high() + 1e-9);
     }
   }
+}
+
+const LinkModel::Swarm& Loop::steadiest() const {
+  // Undisturbed placements vary least between runs.
+  return *std::min_element(model_.swarms.begin(), model_.swarms.end(),
+                           [](const auto& a, const auto& b) { return a.run_sd_db < b.run_sd_db; });
 }
 
 void write_text(const std::filesystem::path& file, const std::string& text) {
@@ -424,10 +444,7 @@ proto::Model Loop::write_models() const {
     write(model_.radio(model_.swarms[q], timing_), "model-" + train_[q].name + ".txtpb",
           "The same with the robots and pairs of " + train_[q].name + ".");
   }
-  // Undisturbed placements vary least between runs: uses the smallest noise of the sets.
-  const auto steadiest = std::min_element(model_.swarms.begin(), model_.swarms.end(),
-                                          [](const auto& a, const auto& b) { return a.run_sd_db < b.run_sd_db; });
-  return write(model_.population(*steadiest, drawn()), "model.txtpb",
+  return write(model_.population(steadiest(), drawn()), "model.txtpb",
                "Range, pattern and variances, fitted to all sets; robots and pairs are random.");
 }
 
@@ -527,6 +544,60 @@ void Loop::write_tables(const identification::RadioFit& fit) const {
   write_text(options_.out / "effects.md", table);
 }
 
+/// The measured sets beside swarms that stand as those of model.txtpb do, and beside swarms of other placements: the common pattern
+/// plus one that is drawn for each swarm. Classes of one distance together.
+void Loop::write_placements() const {
+  const proto::Radio population = model_.population(steadiest(), drawn());
+  const auto with_pattern = [&](const std::vector<double>& pattern_db) {
+    LinkModel::Swarm swarm = steadiest();
+    swarm.pattern_db = pattern_db;
+    return model_.population(swarm, drawn());
+  };
+  const auto drawn_placement = [&](int k) {
+    const Random random(kFirstSwarm);
+    std::vector<double> pattern_db = model_.pattern_db;
+    for (std::size_t n = 0; n < pattern_db.size(); ++n)
+      pattern_db[n] +=
+          model_.laying_sd_db / static_cast<double>(n / 2 + 1) *
+          random.normal(Stream::kLink, static_cast<std::uint32_t>(k), Tick{0}, static_cast<std::uint32_t>(n));
+    return with_pattern(pattern_db);
+  };
+  std::string table =
+      "| set | mm | measured | swarms placed as model.txtpb | 95 % | common pattern | 95 % | drawn placements | 95 "
+      "% |\n"
+      "|---|---|---|---|---|---|---|---|---|\n";
+  for (std::size_t q = 0; q < train_.size(); ++q) {
+    const std::vector<DisplacementClass> real = statistics(test_[q]).classes;
+    const std::vector<std::vector<double>> as[] = {
+        reception_of_swarms(q, [&](int) { return population; }),
+        reception_of_swarms(q, [&](int) { return with_pattern(model_.pattern_db); }),
+        reception_of_swarms(q, drawn_placement)};
+    for (std::size_t c = 0, end = 0; c < real.size() && real[c].distance_mm <= kNeverHeard_mm; c = end) {
+      while (end < real.size() && real[end].distance_mm - real[c].distance_mm < 1e-6) ++end;
+      const auto mean_of = [&](auto&& value) {
+        double sum = 0;
+        for (std::size_t k = c; k < end; ++k) sum += value(k);
+        return sum / static_cast<double>(end - c);
+      };
+      const double measured = mean_of([&](std::size_t k) { return real[k].reception; });
+      table += fmt::format("| {} | {:.0f} | {:.3f} |", train_[q].name, real[c].distance_mm, measured);
+      for (const auto& classes : as) {
+        std::vector<double> swarms;
+        stats::Moments moments;
+        for (std::size_t s = 0; s < classes[c].size(); ++s) {
+          swarms.push_back(mean_of([&](std::size_t k) { return classes[k][s]; }));
+          moments.add(swarms.back());
+        }
+        const double low = stats::nearest_quantile(swarms, 0.025), high = stats::nearest_quantile(swarms, 0.975);
+        const bool inside = measured >= low - 1e-9 && measured <= high + 1e-9;
+        table += fmt::format(" {:.3f} | {:.2f}..{:.2f}{} |", moments.mean(), low, high, inside ? "" : ", outside");
+      }
+      table += "\n";
+    }
+  }
+  write_text(options_.out / "placements.md", table);
+}
+
 void Loop::write_figures() const {
   for (std::size_t q = 0; q < train_.size(); ++q) {
     Plot plot;
@@ -582,6 +653,7 @@ RadioFound Loop::go() {
   RadioFound found{result(), write_models()};
   write_text(options_.out / "result.json", identify::json_of(found.fit).dump(2) + "\n");
   write_tables(found.fit);
+  if (options_.placements) write_placements();
   write_figures();
   return found;
 }

@@ -16,6 +16,8 @@ int main(int argc, char** argv) {
   app.add_flag("--swap", options.swap, "exchange training and held-out half");
   app.add_option("--runs", options.runs, "simulated runs per effect and set")->check(CLI::Range(4, 10000));
   app.add_option("--swarms", options.swarms, "random swarms of the fitted population")->check(CLI::Range(1, 10000));
+  app.add_flag("--placements", options.placements,
+               "also compare with swarms of the population's placement and of drawn placements: placements.md");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -84,5 +84,22 @@ TEST(Distributions, TheLogarithmOfATailIsExactOnBothSides) {
   EXPECT_NEAR(log10_chi_squared_tail(4000, 2), -2000 / std::log(10.0), 1e-9);
 }
 
+TEST(WilsonInterval, HoldsTheProbabilityAsOftenAsStated) {
+  // Exact coverage over the binomial distribution.
+  constexpr int kTrials = 100;
+  for (const double probability : {0.05, 0.3, 0.95}) {
+    double covered = 0, mass = std::pow(1 - probability, kTrials);
+    for (int hits = 0; hits <= kTrials; ++hits) {
+      const auto [low, high] = wilson_interval(hits, kTrials);
+      if (low <= probability && probability <= high) covered += mass;
+      mass *= (kTrials - hits) / (hits + 1.0) * probability / (1 - probability);
+    }
+    EXPECT_GT(covered, 0.93) << probability;
+    EXPECT_LT(covered, 0.98) << probability;
+  }
+  EXPECT_EQ(wilson_interval(0, 50).first, 0);
+  EXPECT_EQ(wilson_interval(50, 50).second, 1);
+}
+
 }  // namespace
 }  // namespace kilotwin::stats

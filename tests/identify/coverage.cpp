@@ -1,0 +1,172 @@
+#include "tests/identify/coverage.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "core/stats/distributions.hpp"
+#include "core/stats/moments.hpp"
+#include "tests/identify/truth/dice.hpp"
+
+namespace kilotwin::truth {
+namespace {
+
+using nlohmann::json;
+
+/// A situation of a robot that drives straight ahead, with a value of the covariate of a band.
+std::optional<Situation> situation_at(const std::string& covariate, const json& at) {
+  Situation s;
+  s.motion = Motion::kStraight;
+  s.since_change_s = s.since_rest_s = 30;
+  if (covariate == "position" && at.is_array() && at.size() == 2) {
+    s.disc = {at[0], at[1]};
+    return s;
+  }
+  if (!at.is_number()) return std::nullopt;
+  if (covariate == "time")
+    s.time_s = at;
+  else if (covariate == "heading")
+    s.heading_rad = at;
+  else if (covariate == "time_since_command")
+    s.since_change_s = at;
+  else if (covariate == "motor_time")
+    s.driven_s = {at, at};
+  else
+    return std::nullopt;
+  return s;
+}
+
+/// The relative change of both wheels' speeds. Nothing if the effects act otherwise.
+std::optional<double> change_of_speed(const Scene& scene, const Situation& at) {
+  Push push;
+  for (const Effect& effect : scene.effects)
+    if (effect.push) effect.push(at, push);
+  const bool alike = push.gain.left == push.gain.right && push.turn_rad_s == 0 && push.slip_mm_s.x == 0 &&
+                     push.slip_mm_s.y == 0 && push.drift_mm_s.x == 0 && push.drift_mm_s.y == 0 &&
+                     push.offset_mm_s.left == 0 && push.offset_mm_s.right == 0;
+  return alike ? std::optional(push.gain.left - 1) : std::nullopt;
+}
+
+/// A point of a band of relative changes.
+struct BandPoint {
+  double truth, value, low, high;
+};
+
+/// The band of the effect found, with the true changes. Empty if there is no band, if several effects were found, or if the true
+/// effect does not change both wheels alike.
+std::vector<BandPoint> band_of(const Scene& scene, const json& result) {
+  std::vector<BandPoint> points;
+  const json& effects = result.at("effects");
+  if (effects.size() != 1 || effects[0].at("covariates").size() != 1) return points;
+  if (!effects[0].at("name").get<std::string>().starts_with("speed-by-")) return points;
+  const std::string covariate = effects[0].at("covariates")[0];
+  for (const json& band : effects[0].at("parameters").value("bands_95", json::array())) {
+    for (std::size_t i = 0; i < band.at("at").size(); ++i) {
+      const std::optional<Situation> at = situation_at(covariate, band.at("at")[i]);
+      if (const std::optional<double> truth = at ? change_of_speed(scene, *at) : std::nullopt)
+        points.push_back({*truth, band.at("value")[i], band.at("low")[i], band.at("high")[i]});
+    }
+  }
+  return points;
+}
+
+/// The model's curves are relative to a mean speed of the data, the true ones to that of an undisturbed robot. This factor turns true
+/// speeds and biases into those of the model: the mean over the band, weighted by its precision.
+double level_of(const std::vector<BandPoint>& band) {
+  double sum = 0, weights = 0;
+  for (const BandPoint& p : band) {
+    const double weight = 1 / ((p.high - p.low) * (p.high - p.low));
+    sum += weight * (1 + p.truth) / (1 + p.value);
+    weights += weight;
+  }
+  return band.empty() ? 1 : sum / weights;
+}
+
+}  // namespace
+
+Scene with_drawn_parameters(Scene scene, std::uint64_t seed) {
+  Dice dice(seed ^ 0x636f766572);
+  scene.wheel_base_mm += 2 * dice.normal();
+  scene.straight_mm_s += 1 * dice.normal();
+  scene.turn_mm_s += 2 * dice.normal();
+  scene.bias_mean_mm_s += scene.bias_sd_mm_s / 2 * dice.normal();
+  return scene;
+}
+
+void Coverage::add_interval(const std::string& set, const std::string& parameter, double truth, double low,
+                            double high) {
+  Share& share = intervals_[parameter];
+  const bool holds = low <= truth && truth <= high;
+  if (!holds) fmt::print("{}: {} is {:.6g}, not in {:.6g}..{:.6g}\n", set, parameter, truth, low, high);
+  share.held += holds ? 1 : 0;
+  ++share.all;
+}
+
+void Coverage::add(const std::string& kind, const Scene& scene, const Play& played,
+                   const std::filesystem::path& out) {
+  std::ifstream in(out / "result.json");
+  const json result = json::parse(in);
+  const std::vector<BandPoint> band = scene.effects.empty() ? std::vector<BandPoint>{} : band_of(scene, result);
+  const double level = level_of(band);
+  if (!band.empty()) {
+    Share& points =
+        bands_[fmt::format("{}, {}", kind, result.at("effects")[0].at("name").get<std::string>())].emplace_back();
+    for (const BandPoint& p : band) {
+      const double truth = (1 + p.truth) / level - 1;
+      points.held += p.low <= truth && truth <= p.high ? 1 : 0;
+      ++points.all;
+    }
+  } else if (!scene.effects.empty()) {
+    ++without_band_[kind];
+  }
+  const auto with_sd = [&](const char* parameter, double truth, double value, double sd) {
+    add_interval(scene.name, parameter, truth, value - stats::kNormal95 * sd, value + stats::kNormal95 * sd);
+  };
+  const auto base = [&](const char* parameter, double truth) {
+    with_sd(parameter, truth, result.at("base").at(parameter), result.at("base_sd").at(parameter));
+  };
+  const auto noise = [&](const char* parameter, double truth) {
+    const json &low = result.at("noise_low").at(parameter), &high = result.at("noise_high").at(parameter);
+    // Null: a variance that may be as large as any.
+    add_interval(scene.name, parameter, truth, low, high.is_null() ? INFINITY : high.get<double>());
+  };
+  base("wheel_base_mm", scene.wheel_base_mm);
+  base("tracked_point_ahead_mm", scene.tracked_ahead_mm);
+  base("tracked_point_left_mm", 0);
+  noise("tracker_position_sd_mm", scene.tracker_sd_mm);
+  if (scene.heading) noise("tracker_heading_sd_rad", scene.heading_sd_rad);
+  noise("factor_variance_s", scene.factor_sd * scene.factor_sd * scene.step_s);
+  if (!scene.effects.empty() && band.empty()) return;
+  base("straight_speed_mm_s", level * scene.straight_mm_s);
+  base("turn_speed_mm_s", level * scene.turn_mm_s);
+  for (const json& robot : result.at("robots")) {
+    const Wheels<double>& bias = played.individuals.at(robot.at("robot").get<std::size_t>()).bias_mm_s;
+    with_sd("bias_left_mm_s", level * bias.left, robot.at("bias_left_mm_s"), robot.at("sd_left_mm_s"));
+    with_sd("bias_right_mm_s", level * bias.right, robot.at("bias_right_mm_s"), robot.at("sd_right_mm_s"));
+  }
+}
+
+void Coverage::print() const {
+  for (const auto& [parameter, share] : intervals_) {
+    const auto [low, high] = stats::wilson_interval(share.held, share.all);
+    fmt::print("{:24} {:5} of {:5} intervals hold the truth: {:.1f} %, 95 % interval {:.1f} to {:.1f}\n", parameter,
+               share.held, share.all, 100.0 * share.held / share.all, 100 * low, 100 * high);
+  }
+  for (const auto& [band, sets] : bands_) {
+    // The points of one band depend on each other: the sets are the sample.
+    stats::Moments shares;
+    int points = 0;
+    for (const Share& set : sets) {
+      shares.add(100.0 * set.held / set.all);
+      points += set.all;
+    }
+    fmt::print("{}: bands of {} sets hold the truth at {:.1f} % of {} points, standard error {:.1f}\n", band,
+               sets.size(), shares.mean(), points, shares.standard_error());
+  }
+  for (const auto& [kind, sets] : without_band_) fmt::print("{}: {} sets without a band to compare\n", kind, sets);
+}
+
+}  // namespace kilotwin::truth
