@@ -6,7 +6,7 @@ static volatile uint16_t in16 = 1234;
 static volatile uint32_t in32 = 123456;
 static volatile int16_t out;
 uint8_t table[16], octets[12];
-uint16_t distances[12];
+uint16_t distances[12] = {35, 48, 61, 33, 90, 72, 55, 41, 67, 80, 38, 52};
 struct {
   uint8_t id, distance;
   uint32_t seen;
