@@ -163,7 +163,7 @@ def command_of(program: str, name: str, arguments: argparse.Namespace, parser: a
             continue
         flag = "--" + option.replace("_", "-")
         text = "DATA" if option == "data" else f"{value:g}" if isinstance(value, float) else shlex.quote(str(value))
-        words.append(flag if value is True else f"{flag}={text}" if " " in text else f"{flag} {text}")
+        words.append(flag if value is True else f"{flag}={text}" if " " in text or text.startswith("-") else f"{flag} {text}")
     return " ".join(words)
 
 

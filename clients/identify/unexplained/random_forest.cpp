@@ -19,7 +19,7 @@ constexpr std::uint32_t kSeed = 20180729;
 
 /// Covariates as numbers of bins with about equally many examples.
 struct CovariateBins {
-  std::vector<std::vector<float>> upper;                             ///< end of each bin but the last, by covariate
+  std::vector<std::vector<float>> upper;  ///< end of each bin but the last, by covariate
   Eigen::Matrix<std::uint8_t, Eigen::Dynamic, Eigen::Dynamic> codes;  ///< as the covariates
 
   explicit CovariateBins(const Eigen::MatrixXf& covariates) : codes(covariates.rows(), covariates.cols()) {
@@ -31,11 +31,12 @@ struct CovariateBins {
         // Between two different values; examples of one value share a bin.
         const float below = sorted[b * (sorted.size() - 1) / kQuantiles];
         const auto next = std::upper_bound(sorted.begin(), sorted.end(), below);
-        if (next != sorted.end() && (ends.empty() || below > ends.back())) ends.push_back(below + (*next - below) / 2);
+        if (next != sorted.end() && (ends.empty() || below > ends.back()))
+          ends.push_back(below + (*next - below) / 2);
       }
       for (Eigen::Index r = 0; r < covariates.rows(); ++r)
-        codes(r, c) = static_cast<std::uint8_t>(
-            std::lower_bound(ends.begin(), ends.end(), covariates(r, c)) - ends.begin());
+        codes(r, c) =
+            static_cast<std::uint8_t>(std::lower_bound(ends.begin(), ends.end(), covariates(r, c)) - ends.begin());
     }
   }
 };
@@ -46,7 +47,11 @@ struct CovariateBins {
 class RandomForest::Grower {
  public:
   Grower(const CovariateBins& bins, const Eigen::VectorXf& targets, std::array<std::uint32_t, 2> key)
-      : bins_(bins), targets_(targets), key_(key), order_(bins.upper.size()), rows_(static_cast<std::size_t>(targets.size())) {
+      : bins_(bins),
+        targets_(targets),
+        key_(key),
+        order_(bins.upper.size()),
+        rows_(static_cast<std::size_t>(targets.size())) {
     std::iota(order_.begin(), order_.end(), 0U);
     for (Eigen::Index& row : rows_) row = static_cast<Eigen::Index>(below(rows_.size()));
   }
@@ -118,7 +123,8 @@ class RandomForest::Grower {
   Tree tree_;
 };
 
-RandomForest::RandomForest(const Eigen::MatrixXf& covariates, const Eigen::MatrixX2f& targets, std::uint32_t threads) {
+RandomForest::RandomForest(const Eigen::MatrixXf& covariates, const Eigen::MatrixX2f& targets,
+                           std::uint32_t threads) {
   const CovariateBins bins(covariates);
   const std::array<Eigen::VectorXf, 2> components{targets.col(0), targets.col(1)};
   for (std::vector<Tree>& trees : trees_) trees.resize(kTrees);

@@ -55,7 +55,7 @@ int main(int argc, char** argv) {
         played.push_back(test::play(cause.truth, static_cast<std::size_t>(robots), seconds,
                                     static_cast<std::uint64_t>(1000 * set + r + 1)));
       const FloorTarget target(played, {});
-      const auto progress = [](const stats::Work& work) {
+      const auto progress = [](const kilotwin::stats::Work& work) {
         if (std::getenv("FLOOR_ALARMS_VERBOSE") != nullptr) fmt::print("  {} {}\n", work.stage, work.activity);
       };
       const FloorFound found =
