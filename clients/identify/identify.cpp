@@ -120,6 +120,8 @@ std::vector<std::pair<std::string, proto::Model>> candidates_of(const Findings& 
     FitState rival = f.found.fit;
     rival.model.terms[static_cast<std::size_t>(at - terms.begin())] = *a.alternative;
     fitter.fit(rival, 2);
+    // Written models differ in the effect alone.
+    rival.model.noise = f.found.fit.model.noise;
     out.emplace_back(a.instead, proto_of(rival.model));
     write_noise_effects(out.back().second, rival.model.noise, f.noise_effects);
   }
@@ -194,7 +196,8 @@ void judge(Findings& f, const Fitter& fitter, const Evaluation& evaluation, cons
   if (f.after.forecasts.size() != f.before.forecasts.size()) {
     keep_base_model(f);
     set_noise(f, fitter);
-    f.after = f.before;
+    f.base = f.found.fit;
+    f.after = f.before = evaluation.judge(f.base, reported);
   }
   if (gives_errors(f.held_out) && f.before.errors.rows == 0) f.held_out = HeldOut::kNoTime;
   if (!gives_errors(f.held_out)) return;

@@ -55,7 +55,7 @@ void Follower::take(Track& track, std::size_t index, const Sighting& sighting) {
   track.path.add(time_s_, sighting.x_mm, sighting.y_mm);
   const double sd_mm = std::sqrt(0.5 * (sighting.error.xx + sighting.error.yy));
   const std::optional<ShownHeading> shown = shown_heading(track, sighting);
-  track.shows_heading = shown.has_value();
+  track.shows_heading = shown || (track.shows_heading && !track.path.heading_rad());
   if (shown)
     track.heading_filter.update(time_s_, sighting.x_mm, sighting.y_mm, sd_mm, shown->heading_rad, shown->sd_rad);
   else

@@ -45,7 +45,7 @@ struct Track {
 
   // Only the follower uses these.
   StraightPath path;
-  bool shows_heading = false;     ///< in the last picture in which it was seen
+  bool shows_heading = false;     ///< its heading rests on its LED or body, and not on a straight path since
   std::optional<Led> led_read{};  ///< of the last picture
   int frames = 0, hits = 0;       ///< while it is not confirmed
 };

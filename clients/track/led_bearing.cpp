@@ -2,13 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/base/pose.hpp"
 
 namespace kilotwin::track {
 namespace {
 
-constexpr double kEnough = 60;           ///< readings
+/// The mount is learned anew when the readings have grown by this factor.
+constexpr double kLearnedEvery = 1.02;
 constexpr double kWindow_rad = kPi / 3;  ///< around the mode
 constexpr double kAgreement = 0.6;       ///< share of the readings in the window
 /// Reach of the biweight kernel, rad. Robots that slide give readings farther off than this on one side: they must not pull.
@@ -27,45 +29,60 @@ void LedBearing::add(double bearing_rad, double heading_rad) {
   if (total_ >= kMostWeight) {
     for (double& count : counts_) count /= 2;
     total_ /= 2;
+    next_ /= 2;
   }
   const double off = wrapped(bearing_rad - heading_rad);
   const auto bin = static_cast<std::size_t>((off + kPi) / kBin_rad);
   counts_.at(std::min(bin, kBins - 1)) += 1;
   total_ += 1;
+  if (total_ < next_) return;
+  learned_ = learned_mount();
+  next_ = kLearnedEvery * total_;
 }
 
 std::optional<LedMount> LedBearing::mount() const {
-  if (known_rad_) return LedMount{*known_rad_, kRobotsDiffer_rad};
-  return learned_mount();
+  if (known_rad_) return LedMount{*known_rad_, learned_ ? learned_->sd_rad : kRobotsDiffer_rad};
+  return learned_;
 }
 
 std::optional<LedMount> LedBearing::learned_mount() const {
-  if (total_ < kEnough) return std::nullopt;
   // The mode: where the readings are densest by a biweight kernel.
-  const auto reach = static_cast<std::size_t>(kReach_rad / kBin_rad);
+  constexpr auto kReach = static_cast<std::size_t>(kReach_rad / kBin_rad);
+  const auto weight = [](double off_rad) {
+    const double u = off_rad / kReach_rad;
+    return (1 - u * u) * (1 - u * u);
+  };
   std::array<double, kBins> density{};
   for (std::size_t i = 0; i < kBins; ++i) {
-    for (std::size_t j = 0; j <= 2 * reach; ++j) {
-      const double u = (static_cast<double>(j) - static_cast<double>(reach)) * kBin_rad / kReach_rad;
-      density.at(i) += counts_.at((i + kBins + j - reach) % kBins) * (1 - u * u) * (1 - u * u);
+    for (std::size_t j = 0; j <= 2 * kReach; ++j) {
+      const double off = (static_cast<double>(j) - static_cast<double>(kReach)) * kBin_rad;
+      density.at(i) += counts_.at((i + kBins + j - kReach) % kBins) * weight(off);
     }
   }
   const auto mode = static_cast<std::size_t>(std::max_element(density.begin(), density.end()) - density.begin());
   // Of the readings around it.
-  double near = 0, near_weight = 0, shift = 0, square = 0;
+  double weights = 0, shift = 0, inside = 0;
+  std::array<std::pair<double, double>, kBins> by_distance;  // count of each bin
   for (std::size_t i = 0; i < kBins; ++i) {
-    const double off = wrapped(offset_of(i) - offset_of(mode)), u = off / kReach_rad;
-    if (std::abs(off) <= 0.5 * kWindow_rad) near += counts_.at(i);
-    if (std::abs(u) >= 1) continue;
-    const double weight = counts_.at(i) * (1 - u * u) * (1 - u * u);
-    near_weight += weight;
-    shift += weight * off;
-    square += weight * off * off;
+    const double off = wrapped(offset_of(i) - offset_of(mode));
+    by_distance.at(i) = {std::abs(off), counts_.at(i)};
+    if (std::abs(off) <= 0.5 * kWindow_rad) inside += counts_.at(i);
+    if (std::abs(off) >= kReach_rad) continue;
+    weights += counts_.at(i) * weight(off);
+    shift += counts_.at(i) * weight(off) * off;
   }
-  if (near < kAgreement * total_) return std::nullopt;
-  shift /= near_weight;
-  const double sd_rad = std::sqrt(square / near_weight - shift * shift);
-  return LedMount{wrapped(offset_of(mode) + shift), std::max(kRobotsDiffer_rad, sd_rad)};
+  if (inside < kAgreement * total_) return std::nullopt;
+  // Half of those in the window are nearer than the median distance.
+  std::sort(by_distance.begin(), by_distance.end());
+  double nearer = 0, median_rad = 0;
+  for (const auto& [distance_rad, count] : by_distance) {
+    median_rad = distance_rad;
+    nearer += count;
+    if (nearer >= 0.5 * inside) break;
+  }
+  constexpr double kSdOfMedianDistance = 1.4826;  // of a normal distribution
+  return LedMount{wrapped(offset_of(mode) + shift / weights),
+                  std::max(kRobotsDiffer_rad, kSdOfMedianDistance * median_rad)};
 }
 
 void StraightPath::add(double time_s, double x_mm, double y_mm) {

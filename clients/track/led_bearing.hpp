@@ -38,9 +38,12 @@ class LedBearing {
   static double offset_of(std::size_t bin) { return (static_cast<double>(bin) + 0.5) * kBin_rad - kPi; }
   [[nodiscard]] std::optional<LedMount> learned_mount() const;
 
+  static constexpr double kEnough = 60;  ///< readings
+
   std::optional<double> known_rad_;
+  std::optional<LedMount> learned_;
   std::array<double, kBins> counts_{};  ///< of readings less headings, by bins from -pi on
-  double total_ = 0;
+  double total_ = 0, next_ = kEnough;   ///< readings; and how many the next mount takes
 };
 
 /// The heading of a robot whose path over the last two seconds is straight; fed with each measured centre.

@@ -9,6 +9,7 @@ namespace kilotwin::behaviours {
 namespace {
 
 constexpr std::string_view kBlank = " \t\r";
+constexpr std::string_view kBlankOrSemicolon = " \t\r;";
 
 std::string_view trimmed(std::string_view text) {
   const std::size_t first = text.find_first_not_of(kBlank);
@@ -70,7 +71,10 @@ class Reader {
     }
     text = text.substr(0, text.find('#'));
     while (!text.empty()) {
-      const std::size_t end = text.find(';');
+      std::size_t end = text.find(';');
+      // Clang writes "rep;movsq": a prefix is no instruction of its own.
+      while (end != std::string_view::npos && is_prefix(trimmed(text.substr(0, end))))
+        end = text.find(';', end + 1);
       statement(text.substr(0, end));
       text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
     }
@@ -88,8 +92,8 @@ class Reader {
     std::string_view name;
     std::string_view rest = content;
     do {
-      name = rest.substr(0, rest.find_first_of(kBlank));
-      rest = trimmed(rest.substr(name.size()));
+      name = rest.substr(0, rest.find_first_of(kBlankOrSemicolon));
+      rest.remove_prefix(std::min(rest.size(), rest.find_first_not_of(kBlankOrSemicolon, name.size())));
     } while (is_prefix(name) && !rest.empty());
     add({Statement::Kind::kInstruction, section_, text, name, rest});
   }

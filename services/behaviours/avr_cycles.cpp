@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <array>
+#include <cstdlib>
+#include <string>
 
 #include "services/behaviours/cycle_counters.hpp"
 
@@ -48,6 +50,7 @@ unsigned avr_cycles(std::string_view name, std::string_view operands) {
       Cost{"divl", kDivision32},
       Cost{"divq", kDivision64},
       Cost{"idivb", kSignedDivision8},
+      Cost{"idivq", kDivision64},
       Cost{"idiv", kSignedDivision16},
       Cost{"imulq", 180},
       Cost{"imul", 40},
@@ -65,9 +68,12 @@ unsigned avr_cycles(std::string_view name, std::string_view operands) {
       Cost{"mova", 2},
       Cost{"pxor", 1},
   };
-  // By a constant: the index of an array, a pointer's 16 bits.
+  // By a constant of 16 bits: nearly always the index of an array, a pointer's 16 bits. A product of 64 bits is underestimated.
   constexpr unsigned kIndex = 12;
-  if (name == "imulq" && operands.starts_with('$')) return kIndex;
+  constexpr long long kMostIndexed = 65535;
+  if (name == "imulq" && operands.starts_with('$') &&
+      std::atoll(std::string(operands.substr(1)).c_str()) <= kMostIndexed)
+    return kIndex;
   unsigned cycles = 2;
   for (const Cost& cost : kCosts) {
     if (name.starts_with(cost.start)) {

@@ -61,6 +61,18 @@ std::optional<std::int64_t> constant_of(std::string_view operand) {
   return *end == '\0' ? std::optional<std::int64_t>(value) : std::nullopt;
 }
 
+/// The constant that the register holds at `i`, if the block says so.
+std::optional<std::int64_t> constant_in(std::span<const Statement> block, std::uint32_t i, int of) {
+  while (of != kNoRegister && i-- > 0) {
+    const Statement& s = block[i];
+    if (s.kind != Statement::Kind::kInstruction) continue;
+    const Operands operands = split(s.operands);
+    if (register_of(operands.last()) != of || s.name.starts_with("cmp") || s.name.starts_with("test")) continue;
+    return s.name.starts_with("mov") ? constant_of(operands.word[0]) : std::nullopt;
+  }
+  return std::nullopt;
+}
+
 /// A shift to the right of a register by a constant.
 struct Shift {
   unsigned bits = 0;
@@ -120,6 +132,29 @@ bool is_reciprocal(std::uint64_t factor, unsigned bits) {
   const std::uint64_t one = std::uint64_t{1} << bits, divisor = (one + factor - 1) / factor;
   const std::uint64_t excess = divisor * factor - one;
   return divisor >= 3 && divisor <= kMostDivisor && excess > 0 && excess <= one >> kPrecision;
+}
+
+/// The same for a factor of 8 bits, of numbers of at least 7 bits.
+bool is_short_reciprocal(std::uint64_t factor, unsigned bits) {
+  const std::uint64_t one = std::uint64_t{1} << bits,
+                      divisor = (one + factor - 1) / std::max<std::uint64_t>(factor, 1);
+  const std::uint64_t excess = divisor * factor - one;
+  return bits <= 16 && divisor >= 3 && divisor <= 255 && excess > 0 && excess <= one >> 7;
+}
+
+/// The same for a factor of 32 or 33 bits, of numbers of at least 24 bits. `bits`: of the first shift; a second one may follow.
+bool is_long_reciprocal(std::int64_t factor, unsigned bits) {
+  constexpr unsigned kPrecision = 24, kMostBits = 52;
+  constexpr std::uint64_t kMostDivisor = 1 << 20;
+  const std::uint64_t low = static_cast<std::uint64_t>(factor) & 0xffffffff;
+  for (const std::uint64_t candidate : {low, low | std::uint64_t{1} << 32}) {
+    for (unsigned b = bits; candidate > 1024 && b <= std::min(bits + 12, kMostBits); ++b) {
+      const std::uint64_t one = std::uint64_t{1} << b, divisor = (one + candidate - 1) / candidate;
+      const std::uint64_t excess = divisor * candidate - one;
+      if (divisor >= 3 && divisor <= kMostDivisor && excess > 0 && excess <= one >> kPrecision) return true;
+    }
+  }
+  return false;
 }
 
 /// Whether an instruction after `i` adds the register, or the dividend to it, as a factor of 17 bits needs.
@@ -202,7 +237,10 @@ std::optional<unsigned> constant_division_cycles(std::span<const Statement> bloc
   const Operands operands = split(s.operands);
   if (s.name == "mulb" || s.name == "imulb") {
     const auto shift = shift_of(block, i, register_of("%rax"), 8, 16);
-    if (!shift) return std::nullopt;
+    std::optional<std::int64_t> by = constant_in(block, i, register_of(operands.last()));
+    if (!by) by = constant_in(block, i, register_of("%rax"));
+    if (!shift || !by || !is_short_reciprocal(static_cast<std::uint64_t>(*by) & 0xff, shift->bits))
+      return std::nullopt;
     return s.name == "mulb" ? kDivision8 : kSignedDivision8;
   }
   if (!s.name.starts_with("imul") || operands.count < 2) return std::nullopt;
@@ -213,6 +251,11 @@ std::optional<unsigned> constant_division_cycles(std::span<const Statement> bloc
     const auto shift = shift_of(block, i, to, 32, 64);
     if (!shift) return std::nullopt;
     const int from = register_of(operands.word[factor ? 1 : 0]);
+    // A factor that the block does not load is one that the compiler has taken out of a loop.
+    std::optional<std::int64_t> known = factor;
+    if (!known) known = constant_in(block, i, from);
+    if (!known) known = constant_in(block, i, to);
+    if (known && !is_long_reciprocal(*known, shift->bits)) return std::nullopt;
     const bool is_signed =
         shift->is_signed || (factor && *factor < 0) || is_extended(block, i, from) || is_extended(block, i, to);
     // Of an int, which has 16 bits on the robot, or of an int32_t: nothing here tells. Programs have more of the first.

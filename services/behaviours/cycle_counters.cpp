@@ -15,7 +15,7 @@ namespace kilotwin::behaviours {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
-/// Straight code gets a test after this many cycles of the robot, and after each call.
+/// Straight code gets a test after this many cycles of the robot, and after each call: at the next place where the flags are dead.
 constexpr unsigned kMostCyclesWithoutTest = 64;
 
 /// Properties of a strongly connected component of the control-flow graph.

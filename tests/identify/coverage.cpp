@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -63,6 +64,10 @@ std::vector<BandPoint> band_of(const Scene& scene, const json& result) {
   if (effects.size() != 1 || effects[0].at("covariates").size() != 1) return points;
   if (!effects[0].at("name").get<std::string>().starts_with("speed-by-")) return points;
   const std::string covariate = effects[0].at("covariates")[0];
+  // Over another covariate, the truth has no curve to compare.
+  const bool named = std::any_of(scene.effects.begin(), scene.effects.end(),
+                                 [&](const Effect& effect) { return names(effect, {covariate}); });
+  if (!named) return points;
   for (const json& band : effects[0].at("parameters").value("bands_95", json::array())) {
     for (std::size_t i = 0; i < band.at("at").size(); ++i) {
       const std::optional<Situation> at = situation_at(covariate, band.at("at")[i]);
@@ -147,6 +152,19 @@ void Coverage::add(const std::string& kind, const Scene& scene, const Play& play
     with_sd("bias_left_mm_s", level * bias.left, robot.at("bias_left_mm_s"), robot.at("sd_left_mm_s"));
     with_sd("bias_right_mm_s", level * bias.right, robot.at("bias_right_mm_s"), robot.at("sd_right_mm_s"));
   }
+}
+
+Coverage::Share Coverage::points_of(const std::string& band) const {
+  Share sum;
+  const auto sets = bands_.find(band);
+  if (sets == bands_.end()) return sum;
+  for (const Share& set : sets->second) sum = {sum.held + set.held, sum.all + set.all};
+  return sum;
+}
+
+Coverage::Share Coverage::intervals_of(const std::string& parameter) const {
+  const auto found = intervals_.find(parameter);
+  return found == intervals_.end() ? Share{} : found->second;
 }
 
 void Coverage::print() const {

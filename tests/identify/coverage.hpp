@@ -23,10 +23,14 @@ class Coverage {
   /// One line per parameter and per band.
   void print() const;
 
- private:
   struct Share {
     int held = 0, all = 0;
   };
+  /// Points of the bands of "SCENE, EFFECT FOUND", of all sets.
+  [[nodiscard]] Share points_of(const std::string& band) const;
+  [[nodiscard]] Share intervals_of(const std::string& parameter) const;
+
+ private:
   void add_interval(const std::string& set, const std::string& parameter, double truth, double low, double high);
   std::map<std::string, Share> intervals_;
   /// By scene and effect found: the points of each set's band.

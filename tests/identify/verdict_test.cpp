@@ -7,7 +7,9 @@
 
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 
+#include "tests/identify/coverage.hpp"
 #include "tests/identify/truth/play.hpp"
 #include "tests/identify/truth/scenarios.hpp"
 
@@ -114,6 +116,66 @@ TEST_F(VerdictTest, FilesThatLackSomethingAreSaidToFail) {
   EXPECT_NE(of(scenario("fatigue"), 3, 3, "{}").failure, "");
   std::filesystem::remove(out_ / "predictions.csv");
   EXPECT_NE(judge(scenario("fatigue"), oracle_, out_).failure, "");
+}
+
+/// A result for the scene "battery" with a band over `covariate`: the true changes of the speed for a mean speed that is 0.9 of the
+/// undisturbed one, and `off` at one of the points.
+std::string battery_result(const Scene& scene, const std::string& covariate, double off) {
+  nlohmann::json band;
+  for (const double time_s : {0.0, 60.0, 120.0, 180.0}) {
+    Situation at;
+    at.motion = Motion::kStraight;
+    at.time_s = time_s;
+    Push push;
+    scene.effects.at(0).push(at, push);
+    const double value = push.gain.left / 0.9 - 1 + (time_s == 120 ? off : 0);
+    band["at"].push_back(time_s);
+    band["value"].push_back(value);
+    band["low"].push_back(value - 0.001);
+    band["high"].push_back(value + 0.001);
+  }
+  const nlohmann::json base = {{"wheel_base_mm", scene.wheel_base_mm},
+                               {"tracked_point_ahead_mm", scene.tracked_ahead_mm},
+                               {"tracked_point_left_mm", 0},
+                               {"straight_speed_mm_s", 0.9 * scene.straight_mm_s},
+                               {"turn_speed_mm_s", 0.9 * scene.turn_mm_s}};
+  const nlohmann::json sd = {{"wheel_base_mm", 0.1},
+                             {"tracked_point_ahead_mm", 0.1},
+                             {"tracked_point_left_mm", 0.1},
+                             {"straight_speed_mm_s", 0.01},
+                             {"turn_speed_mm_s", 0.01}};
+  const nlohmann::json low = {
+      {"tracker_position_sd_mm", 0}, {"tracker_heading_sd_rad", 0}, {"factor_variance_s", 0}};
+  const nlohmann::json high = {
+      {"tracker_position_sd_mm", nullptr}, {"tracker_heading_sd_rad", nullptr}, {"factor_variance_s", 1e-9}};
+  return nlohmann::json{
+      {"effects",
+       {{{"name", "speed-by-" + covariate}, {"covariates", {covariate}}, {"parameters", {{"bands_95", {band}}}}}}},
+      {"base", base},
+      {"base_sd", sd},
+      {"noise_low", low},
+      {"noise_high", high},
+      {"robots", nlohmann::json::array()}}
+      .dump();
+}
+
+TEST_F(VerdictTest, BandsAreComparedUpToTheLevelOfTheCurve) {
+  const Scene scene = scenario("battery");
+  const auto counted = [&](const std::string& covariate, double off) {
+    std::ofstream(out_ / "result.json") << battery_result(scene, covariate, off);
+    Coverage coverage;
+    coverage.add("battery", scene, {}, out_);
+    return coverage;
+  };
+  const Coverage right = counted("time", 0);
+  EXPECT_EQ(right.points_of("battery, speed-by-time").held, 4);
+  EXPECT_EQ(right.points_of("battery, speed-by-time").all, 4);
+  EXPECT_EQ(right.intervals_of("straight_speed_mm_s").held, 1) << "at the same level";
+  EXPECT_EQ(right.intervals_of("factor_variance_s").held, 0);
+  EXPECT_EQ(right.intervals_of("tracker_position_sd_mm").held, 1) << "no upper end";
+  EXPECT_LT(counted("time", 0.1).points_of("battery, speed-by-time").held, 4);
+  // The truth has no curve over places.
+  EXPECT_EQ(counted("heading", 0).points_of("battery, speed-by-heading").all, 0);
 }
 
 }  // namespace

@@ -184,7 +184,7 @@ int identify_data(const IdentifyArguments& arguments) {
   progress->begin({"reading", arguments.train.string(), stats::Work::kSame});
   identify::Identified found = kind.identify(train, test, out, options);
 
-  identify::WorkLog(options.progress).begin(identify::kReport, "drawing the report", "", 0);
+  progress->begin({"drawing the report", "", stats::Work::kSame});
   clamp_to_ranges(found.model);
   os::write_file(options.model_file,
                  identify::text_of(found.model, fmt::format("Identified from {}.", arguments.train.string())));

@@ -25,17 +25,17 @@ constexpr std::size_t kSpreading = kPosition;
 using NoiseVector = Eigen::Matrix<double, kNoises, 1>;
 using PoseByBias = Eigen::Matrix<double, 3, 2>;
 
-/// A lower variance has no influence.
-constexpr std::array<double, kNoises> kLeast = {1e-6, 1e-4, 1e-8, 1e-6, 1e-4, 1e-6};
+/// A lower variance has no influence; a higher one hides everything.
+constexpr std::array<double, kNoises> kLeast = {1e-6, 1e-4, 1e-8, 1e-6, 1e-4, 1e-6},
+                                      kMost = {1, 100, 1, 100, 1e4, 10};
 
 NoiseVector logs_of(const Noise& n) {
   NoiseVector v;
   v << n.factor_s, n.wheel_mm2_s, n.heading_rad2_s, n.drift_mm2_s, n.position_mm2, n.heading_rad2;
   return v.array().log();
 }
-/// Variances within bounds. Above the upper bound a variance hides everything.
+/// Variances within bounds.
 NoiseVector variances(const NoiseVector& logs) {
-  constexpr std::array<double, kNoises> kMost = {1, 100, 1, 100, 1e4, 10};
   NoiseVector v;
   for (Eigen::Index i = 0; i < kNoises; ++i) {
     const auto k = static_cast<std::size_t>(i);
@@ -373,12 +373,13 @@ class Climb {
     return dispersion * wider * wider;
   }
 
-  /// How far variance `i` moves along `ridge`, in its logarithm, until the profile log likelihood is `most_drop` below `value`.
-  /// `ridge`: about how the others follow.
+  /// How far variance `i` moves along `ridge`, in its logarithm, until the profile log likelihood is `most_drop` below `value`;
+  /// infinite if it does not fall so far within the variance's bounds. `ridge`: about how the others follow.
   [[nodiscard]] double profile_end(const NoiseVector& best, double value, Eigen::Index i, const NoiseVector& ridge,
                                    const Eigen::MatrixXd& curvature, double most_drop) const {
-    // By factors of e: beyond, the variance hides everything or has no influence.
-    constexpr double kFarthest = 9;
+    const auto k = static_cast<std::size_t>(i);
+    const double farthest =
+        std::max(0.0, ridge[i] > 0 ? std::log(kMost[k]) - best[i] : best[i] - std::log(kLeast[k]));
     const double along = std::abs(curvature.row(i).dot(ridge.head(size())));
     const double first = std::clamp(std::sqrt(2 * most_drop / std::max(along, 1e-3)), 0.02, 3.0);
     const Search others = from_near(curvature, i);
@@ -396,7 +397,7 @@ class Climb {
       known[far] = at;
       return value - found;
     };
-    return profile_distance(drop, first, kFarthest, most_drop);
+    return profile_distance(drop, first, farthest, most_drop);
   }
 
   /// Number of variances that these data have.
@@ -497,15 +498,17 @@ NoiseInterval noise_interval(const MotionModel& model, const std::vector<const T
   const Eigen::MatrixXd curvature = climb.curvature(best);
   double value = climb(best, climb.from_near(curvature, -1));
   // By how much the likelihood falls if one process noise is none.
-  NoiseVector without = NoiseVector::Constant(INFINITY);
+  NoiseVector without = NoiseVector::Constant(-INFINITY);  // log likelihoods until then
   for (Eigen::Index i = 0; i < kPosition; ++i) {
     NoiseVector at = best;
     at[i] = std::log(kLeast[static_cast<std::size_t>(i)]);
     const double found = climb(at, climb.from_near(curvature, i));
     if (found > value) best = at;
     value = std::max(value, found);
-    without[i] = value - found;
+    without[i] = found;
   }
+  without = (value - without.array()).matrix();
+  best = logs_of(with(model.noise, variances(best)));
   NoiseVector low = NoiseVector::Constant(NAN), high = low;
   for (Eigen::Index i = 0; i < climb.size(); ++i) {
     const NoiseVector ridge = along_ridge(curvature, i);

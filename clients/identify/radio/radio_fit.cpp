@@ -115,7 +115,7 @@ void Loop::add(Step step, const Radios& radios) {
     step.errors.push_back(compare(test_[q], simulated, train_[q]));
   }
   const std::string shown = fmt::format("{}: {}", step.name, step.evidence);
-  constexpr int kSteps = 11;
+  constexpr int kSteps = 14;  // with the population
   if (options_.progress) {
     const double left = std::max(0, kSteps - 2 - static_cast<int>(steps_.size()));
     options_.progress({fmt::format("after {}", shown), "", 0, 1, {{0, left, left}}});

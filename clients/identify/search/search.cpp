@@ -434,7 +434,7 @@ class Loop {
     for (const Hypothesis& h : dictionary_.hypotheses) {
       if (h.name != "camera-by-time") continue;
       const Finding finding = score_test_->evidence_of(h, static_cast<int>(place));
-      if (best != nullptr && finding.evidence <= best_finding.evidence) continue;
+      if (best != nullptr && !(finding.evidence > best_finding.evidence)) continue;
       best = &h;
       best_finding = finding;
     }
@@ -463,7 +463,7 @@ class Loop {
       const Hypothesis* best = nullptr;
       Finding best_finding;
       for (std::size_t h = 0; h < others.size(); ++h) {
-        if (best != nullptr && findings[h].evidence <= best_finding.evidence) continue;
+        if (best != nullptr && !(findings[h].evidence > best_finding.evidence)) continue;
         best = others[h];
         best_finding = findings[h];
       }

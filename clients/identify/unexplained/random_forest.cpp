@@ -9,7 +9,7 @@
 namespace kilotwin::identify {
 namespace {
 
-/// Deep trees with leaves of a few examples, averaged. More trees change the error by less than a percent.
+/// Deep trees, averaged; nodes of fewer than 12 examples are leaves. More trees change the error by less than a percent.
 constexpr std::size_t kTrees = 80;
 constexpr int kDepth = 12;
 constexpr std::ptrdiff_t kFewestToSplit = 12;

@@ -231,7 +231,7 @@ FastCore::Operation FastCore::decode(std::uint32_t pc) const {
     return {loops ? kDelayBySbiw : kSbiw, pair, 0, 1, k};
   }
   if ((o & 0x0800) != 0) return other;
-  const auto address = [&] { return next + 2 < kFlashOctets ? word(next) : 0; };
+  const auto address = [&] { return next + 2 <= kFlashOctets ? word(next) : 0; };
   const auto in_ram = [](std::uint32_t a) { return a >= kRam && a <= kRamEnd; };
   const auto readable = [&](std::uint32_t a) { return in_ram(a) || (a < kRam && plain_[a]); };
   if ((o & 0x0e00) == 0x0000) {
@@ -288,7 +288,7 @@ FastCore::Operation FastCore::decode(std::uint32_t pc) const {
   }
   if ((o & 0xfe0c) == 0x940c) {
     const std::uint32_t to = address() * 2;
-    if ((o & 0x01f1) != 0 || to >= kFlashOctets) return other;
+    if ((o & 0x01f1) != 0 || to >= kFlashOctets || next + 2 > kFlashOctets) return other;
     return {(o & 2) != 0 ? kCall : kJmp, 0, 0, 2, to};
   }
   if ((o & 0xff0f) == 0x9408) {
@@ -775,7 +775,7 @@ template <bool kSeeksLoops> FastCore::Run FastCore::execute(avr_t& avr, std::uin
         avr.cycle -= passed + more;
         passed += more;
         if (more == 0) goto libsimavrs;
-        if (passed < cycles) avr.interrupt_state = 0;
+        if (passed < cycles || !is_set(S_I)) avr.interrupt_state = 0;
         continue;
       }
       default: __builtin_unreachable();

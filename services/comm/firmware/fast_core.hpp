@@ -1,5 +1,5 @@
-/// The instructions of the AVR core that touch registers, RAM and I/O registers without effects, decoded once and executed on
-/// libsimavr's own state. All others are left to libsimavr. The state after any number of instructions is the same in every bit as
+/// Instructions of the AVR core, decoded once and executed on libsimavr's own state: those that touch registers, RAM, I/O registers
+/// without effects, the flag of interrupts, or the analogue converter. All others are left to libsimavr. The state after any number of instructions is the same in every bit as
 /// with libsimavr; tests/services/comm/firmware/fast_core_test.cpp compares both.
 ///
 /// A program that waits comes back to the same state of registers and RAM again and again, until an interrupt or an I/O register

@@ -152,6 +152,14 @@ TEST(LedDirection, IsLearnedFromStraightPaths) {
   }
   ASSERT_TRUE(along_walls.mount());
   EXPECT_NEAR(along_walls.mount()->from_heading_rad, -0.83, 0.03);
+  // The deviation of the readings.
+  LedBearing coarse;
+  for (int i = 0; i < 2000; ++i) {
+    const double heading = any(random);
+    coarse.add(heading - 0.83 + 2 * noise(random), heading);
+  }
+  ASSERT_TRUE(coarse.mount());
+  EXPECT_NEAR(coarse.mount()->sd_rad, 0.2, 0.03);
   // Readings that do not agree teach nothing.
   LedBearing loose;
   for (int i = 0; i < 500; ++i) loose.add(any(random), any(random));
@@ -159,7 +167,7 @@ TEST(LedDirection, IsLearnedFromStraightPaths) {
 }
 
 TEST(LedDirection, ThatIsKnownGivesTheHeadingOfARobotThatNeverMoves) {
-  const auto heading_of = [](std::optional<double> known_rad) {
+  const auto heading_of = [](std::optional<double> known_rad, int dark = 0) {
     FollowLimits limits;
     limits.led_from_heading_rad = known_rad;
     Follower follower(limits);
@@ -167,6 +175,11 @@ TEST(LedDirection, ThatIsKnownGivesTheHeadingOfARobotThatNeverMoves) {
     sighting.led = Led::kRed;
     sighting.led_bearing_rad = 1.0;
     for (int frame = 0; frame < 200; ++frame) {
+      follower.predict(frame / 30.0);
+      follower.update({sighting});
+    }
+    sighting.led_bearing_rad.reset();
+    for (int frame = 200; frame < 200 + dark; ++frame) {
       follower.predict(frame / 30.0);
       follower.update({sighting});
     }
@@ -178,6 +191,7 @@ TEST(LedDirection, ThatIsKnownGivesTheHeadingOfARobotThatNeverMoves) {
   EXPECT_NEAR(heading->heading_rad, 1.8, 1e-3);
   // Two hundred pictures of one robot do not tell how it differs from the others.
   EXPECT_GE(heading->variance_rad2, kRobotsDiffer_rad * kRobotsDiffer_rad);
+  EXPECT_GE(heading_of(-0.8, 10)->variance_rad2, heading->variance_rad2) << "a lamp that goes out tells nothing";
 }
 
 }  // namespace

@@ -91,6 +91,11 @@ TEST(ConstantDivision, MultiplicationsAreNone) {
       << "the index of an array";
   EXPECT_EQ(found("imull $7, %edi, %edi\n cmpl $100, %edi\n"), 0u) << "7 x < 100";
   EXPECT_EQ(found("imull $1000, %edi, %eax\n shrl $16, %eax\n"), 0u);
+  EXPECT_EQ(found("movl %edi, %eax\n mulb %sil\n shrw $8, %ax\n"), 0u) << "a brightness of 8 bits";
+  EXPECT_EQ(found("movl $77, %edx\n movl %edi, %eax\n mulb %dl\n shrw $8, %ax\n"), 0u) << "0.3 x";
+  EXPECT_EQ(found("movabsq $6364136223846793005, %rax\n imulq %rdi, %rax\n shrq $33, %rax\n"), 0u)
+      << "a random number of 64 bits";
+  EXPECT_EQ(found("imulq $1664525, %rdi, %rax\n shrq $32, %rax\n"), 0u);
 }
 
 }  // namespace
