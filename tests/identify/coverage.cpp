@@ -11,6 +11,7 @@
 #include "core/stats/distributions.hpp"
 #include "core/stats/moments.hpp"
 #include "tests/identify/truth/dice.hpp"
+#include "tests/identify/verdict.hpp"
 
 namespace kilotwin::truth {
 namespace {

@@ -472,7 +472,7 @@ std::vector<Path> paths_of(const MotionModel& model, const std::vector<const Tra
 
 /// By which the other log variances follow one of them along the ridge of the likelihood.
 NoiseVector along_ridge(const Eigen::MatrixXd& curvature, Eigen::Index i) {
-  constexpr double kRidge = 0.05, kMost = 3;
+  constexpr double kRidge = 0.05, kSteepest = 3;
   Eigen::MatrixXd others = curvature;
   others.diagonal().array() += kRidge;
   others.row(i).setZero();
@@ -481,7 +481,7 @@ NoiseVector along_ridge(const Eigen::MatrixXd& curvature, Eigen::Index i) {
   Eigen::VectorXd cross = curvature.col(i);
   cross[i] = 0;
   NoiseVector by = NoiseVector::Zero();
-  by.head(curvature.rows()) = -others.ldlt().solve(cross).cwiseMax(-kMost).cwiseMin(kMost);
+  by.head(curvature.rows()) = -others.ldlt().solve(cross).cwiseMax(-kSteepest).cwiseMin(kSteepest);
   by[i] = 1;
   return by;
 }
