@@ -144,11 +144,11 @@ bool is_short_reciprocal(std::uint64_t factor, unsigned bits) {
 
 /// The same for a factor of 32 or 33 bits, of numbers of at least 24 bits. `bits`: of the first shift; a second one may follow.
 bool is_long_reciprocal(std::int64_t factor, unsigned bits) {
-  constexpr unsigned kPrecision = 24, kMostBits = 52;
+  constexpr unsigned kPrecision = 24, kMostMore = 18, kMostBits = 52;
   constexpr std::uint64_t kMostDivisor = 1 << 20;
   const std::uint64_t low = static_cast<std::uint64_t>(factor) & 0xffffffff;
   for (const std::uint64_t candidate : {low, low | std::uint64_t{1} << 32}) {
-    for (unsigned b = bits; candidate > 1024 && b <= std::min(bits + 12, kMostBits); ++b) {
+    for (unsigned b = bits; candidate > 1024 && b <= std::min(bits + kMostMore, kMostBits); ++b) {
       const std::uint64_t one = std::uint64_t{1} << b, divisor = (one + candidate - 1) / candidate;
       const std::uint64_t excess = divisor * candidate - one;
       if (divisor >= 3 && divisor <= kMostDivisor && excess > 0 && excess <= one >> kPrecision) return true;

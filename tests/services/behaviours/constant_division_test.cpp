@@ -65,6 +65,13 @@ TEST(ConstantDivision, OfSignedNumbers) {
       << "int16_t x / 7 by clang";
 }
 
+TEST(ConstantDivision, ByALargeNumber) {
+  EXPECT_EQ(found("movslq %edi, %rax\n imulq $-2092037281, %rax, %rax\n shrq $32, %rax\n addl %edi, %eax\n"
+                  "sarl $31, %edi\n sarl $16, %eax\n"),
+            kSignedDivision16)
+      << "x / 127773, as rand() of avr-libc divides";
+}
+
 TEST(ConstantDivision, OfUnsignedNumbersOf16And8Bits) {
   EXPECT_EQ(found("movzwl %di, %eax\n imull $52429, %eax, %eax\n shrl $19, %eax\n"), kDivision16) << "x / 10";
   EXPECT_EQ(found("movzwl %di, %eax\n imull $9363, %eax, %eax\n shrl $16, %eax\n subl %eax, %edi\n shrw %di\n"),
