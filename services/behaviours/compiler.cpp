@@ -106,7 +106,7 @@ Arguments include_flags(const Compiler& compiler, const fs::path& runtime) {
           "-ffile-prefix-map=" + runtime.string() + "=/kilotwin"};
 }
 
-/// Removes the sources' folders from debug information, so that equal sources in different folders give equal octets.
+/// Removes the sources' folders, and that where one stands, from debug information, so that equal sources give equal octets.
 Arguments place_flags(const std::vector<fs::path>& sources) {
   std::error_code error;
   Arguments flags;
@@ -228,6 +228,7 @@ fs::path runtime_object(const Compiler& compiler, const Arguments& includes, con
   std::error_code error;
   if (fs::is_regular_file(kept, error)) return kept;
   Arguments compile{compiler.path};
+  append(compile, place_flags({}));
   append(compile, code_flags(compiler));
   append(compile, kRuntimeFlags);
   append(compile, includes);
@@ -299,7 +300,8 @@ struct Toolchain {
   [[nodiscard]] Arguments flags_for(const ProgramText& text, const fs::path& file, const Arguments& dialect) const {
     const bool as_cpp = std::find(dialect.begin(), dialect.end(), "c++") != dialect.end();
     Arguments result = language_flags(as_cpp || is_cpp(file));
-    for (const Arguments& part : {code, dialect, defines, place_flags(text.sources), includes})
+    // Of several names for one folder the last one counts: the runtime may be where one stands.
+    for (const Arguments& part : {place_flags(text.sources), code, dialect, defines, includes})
       append(result, part);
     if (robot_int) result.emplace_back("-DKILOTWIN_ROBOT_INT");
     return result;

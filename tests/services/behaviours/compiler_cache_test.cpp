@@ -111,7 +111,10 @@ TEST(CompilerCache, AProgramThatNoLongerNeedsASourceLosesIt) {
   EXPECT_FALSE(mentions(program.notes, "colour.c"));
   CompileOptions elsewhere;
   elsewhere.cache_directory = fresh.path();
-  EXPECT_EQ(program.sha256, compile({source}, elsewhere).sha256);
+  const fs::path here = fs::current_path();
+  fs::current_path(fresh.path());
+  EXPECT_EQ(program.sha256, compile({source}, elsewhere).sha256) << "whoever compiled it, and where";
+  fs::current_path(here);
 }
 
 TEST(CompilerCache, WarningsNameTheFolderThatIsCompiled) {
