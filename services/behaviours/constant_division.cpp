@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <functional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "services/behaviours/cycle_counters.hpp"
 
@@ -13,7 +15,7 @@ namespace {
 
 constexpr int kNoRegister = -1;
 /// Instructions between the multiplication and the shift that takes its upper half.
-constexpr std::uint32_t kReach = 12;
+constexpr std::size_t kReach = 12;
 
 /// The operands, at most three, in AT&T order: the destination is the last.
 struct Operands {
@@ -61,16 +63,38 @@ std::optional<std::int64_t> constant_of(std::string_view operand) {
   return *end == '\0' ? std::optional<std::int64_t>(value) : std::nullopt;
 }
 
-/// The constant that the register holds at `i`, if the block says so.
-std::optional<std::int64_t> constant_in(std::span<const Statement> block, std::uint32_t i, int of) {
+/// The instructions after `i` that may belong to its division.
+std::vector<std::reference_wrapper<const Statement>> instructions_after(std::span<const Statement> block,
+                                                                        std::uint32_t i) {
+  std::vector<std::reference_wrapper<const Statement>> result;
+  for (++i; i < block.size() && result.size() < kReach; ++i)
+    if (block[i].kind == Statement::Kind::kInstruction) result.emplace_back(block[i]);
+  return result;
+}
+
+/// The last instruction before `i` that writes to the register; null: the block has none.
+const Statement* writer_of(std::span<const Statement> block, std::uint32_t i, int of) {
   while (of != kNoRegister && i-- > 0) {
     const Statement& s = block[i];
-    if (s.kind != Statement::Kind::kInstruction) continue;
-    const Operands operands = split(s.operands);
-    if (register_of(operands.last()) != of || s.name.starts_with("cmp") || s.name.starts_with("test")) continue;
-    return s.name.starts_with("mov") ? constant_of(operands.word[0]) : std::nullopt;
+    if (s.kind != Statement::Kind::kInstruction || s.name.starts_with("cmp") || s.name.starts_with("test"))
+      continue;
+    const bool extends_rax = s.name == "cltq" && of == register_of("%rax");
+    if (extends_rax || register_of(split(s.operands).last()) == of) return &s;
   }
-  return std::nullopt;
+  return nullptr;
+}
+
+/// The constant that the register holds at `i`, if the block says so.
+std::optional<std::int64_t> constant_in(std::span<const Statement> block, std::uint32_t i, int of) {
+  const Statement* const writer = writer_of(block, i, of);
+  return writer != nullptr && writer->name.starts_with("mov") ? constant_of(split(writer->operands).word[0])
+                                                              : std::nullopt;
+}
+
+/// Whether the register holds a number with a sign at `i`: what wrote it extends one.
+bool is_extended(std::span<const Statement> block, std::uint32_t i, int of) {
+  const Statement* const writer = writer_of(block, i, of);
+  return writer != nullptr && (writer->name == "cltq" || writer->name.starts_with("movs"));
 }
 
 /// A shift to the right of a register by a constant.
@@ -84,11 +108,7 @@ struct Shift {
 std::optional<Shift> shift_of(std::span<const Statement> block, std::uint32_t i, int of, unsigned least,
                               unsigned width) {
   std::array<int, 2> values{of, kNoRegister};
-  std::uint32_t seen = 0;
-  for (++i; i < block.size() && seen < kReach; ++i) {
-    const Statement& s = block[i];
-    if (s.kind != Statement::Kind::kInstruction) continue;
-    ++seen;
+  for (const Statement& s : instructions_after(block, i)) {
     const Operands operands = split(s.operands);
     const int to = register_of(operands.last());
     const auto is_value = [&](int r) { return r != kNoRegister && (r == values[0] || r == values[1]); };
@@ -109,18 +129,6 @@ std::optional<Shift> shift_of(std::span<const Statement> block, std::uint32_t i,
     values[to == values[0] ? 0 : 1] = kNoRegister;  // it is overwritten
   }
   return std::nullopt;
-}
-
-/// Whether the register holds a number with a sign: the last instruction before `i` that writes to it extends one.
-bool is_extended(std::span<const Statement> block, std::uint32_t i, int of) {
-  while (i-- > 0) {
-    const Statement& s = block[i];
-    if (s.kind != Statement::Kind::kInstruction) continue;
-    if (s.name == "cltq" && of == register_of("%rax")) return true;
-    const Operands operands = split(s.operands);
-    if (register_of(operands.last()) == of) return s.name.starts_with("movs");
-  }
-  return false;
 }
 
 /// Whether a product with `factor`, shifted by `bits`, is a quotient by a constant, of numbers of at least 11 bits: compilers first
@@ -159,11 +167,7 @@ bool is_long_reciprocal(std::int64_t factor, unsigned bits) {
 
 /// Whether an instruction after `i` adds the register, or the dividend to it, as a factor of 17 bits needs.
 bool is_corrected(std::span<const Statement> block, std::uint32_t i, int of, std::string_view by) {
-  std::uint32_t seen = 0;
-  for (++i; i < block.size() && seen < kReach; ++i) {
-    const Statement& s = block[i];
-    if (s.kind != Statement::Kind::kInstruction) continue;
-    ++seen;
+  for (const Statement& s : instructions_after(block, i)) {
     const Operands operands = split(s.operands);
     if (operands.count == 2 && s.name.starts_with(by) &&
         (register_of(operands.word[0]) == of || (by == "add" && register_of(operands.word[1]) == of)))
@@ -186,11 +190,7 @@ struct Comparison {
 };
 std::optional<Comparison> comparison_of(std::span<const Statement> block, std::uint32_t i, int of) {
   bool adds = false;
-  std::uint32_t seen = 0;
-  for (++i; i < block.size() && seen < kReach; ++i) {
-    const Statement& s = block[i];
-    if (s.kind != Statement::Kind::kInstruction) continue;
-    ++seen;
+  for (const Statement& s : instructions_after(block, i)) {
     const Operands operands = split(s.operands);
     if (register_of(operands.last()) != of) continue;
     if (s.name.starts_with("cmp"))

@@ -9,7 +9,7 @@
 namespace kilotwin::behaviours {
 
 /// Part of the cache key of compiled programs. Raise it when this pass or with_loop_barriers() changes its output.
-inline constexpr int kCountersVersion = 14;
+inline constexpr int kCountersVersion = 15;
 
 /// kTestsOnly counts one cycle per test and nothing else. It is for kilolib, which a robot runs in another form.
 enum class Counted : bool { kAll, kTestsOnly };

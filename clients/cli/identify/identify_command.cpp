@@ -19,7 +19,6 @@
 #include "clients/identify/model/model_file.hpp"
 #include "clients/identify/report/report.hpp"
 #include "clients/identify/result/result_json.hpp"
-#include "clients/identify/search/work.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/experiment/clamp.hpp"

@@ -28,8 +28,8 @@ struct RadioFound {
   proto::Model model;  ///< range, pattern and variances, fitted to all sets; robots and pairs are random
 };
 
-/// Writes model.txtpb, model-SET.txtpb (with the robots of that set), result.json, effects.md (table), placements.md if asked for, and figures into
-/// `out`. Throws UserError on unreadable data.
+/// Writes model.txtpb, model-SET.txtpb (with the robots of that set), result.json, effects.md (table), placements.md if asked
+/// for, and figures into `out`. Throws UserError on unreadable data.
 RadioFound fit_radio(const FitOptions& options);
 
 }  // namespace kilotwin::radio_fit

@@ -1,6 +1,6 @@
 /// Instructions of the AVR core, decoded once and executed on libsimavr's own state: those that touch registers, RAM, I/O registers
-/// without effects, the flag of interrupts, or the analogue converter. All others are left to libsimavr. The state after any number of instructions is the same in every bit as
-/// with libsimavr; tests/services/comm/firmware/fast_core_test.cpp compares both.
+/// without effects, the flag of interrupts, or the analogue converter. All others are left to libsimavr. The state after any number
+/// of instructions is the same in every bit as with libsimavr; tests/services/comm/firmware/fast_core_test.cpp compares both.
 ///
 /// A program that waits comes back to the same state of registers and RAM again and again, until an interrupt or an I/O register
 /// changes. The core finds such a loop, and from then on only counts its cycles. The registers and RAM in `avr` are then those at
