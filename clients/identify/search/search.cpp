@@ -23,7 +23,8 @@
 namespace kilotwin::identify {
 namespace {
 
-/// Limits of a search: hypotheses that failed after their refit, general terms, and work (PreparedSet::work). A set of 24 robots, 3 runs and 300 s stays far below the last one.
+/// Limits of a search: hypotheses that failed after their refit, general terms, and work (PreparedSet::work). A set of 24 robots,
+/// 3 runs and 300 s stays far below the last one.
 constexpr int kMostFailed = 20, kMostGeneral = 3;
 constexpr std::uint64_t kMostWork = 3'000'000'000;
 /// Hypotheses with more alternatives (as a logarithm) than this, single steps and pulses, are no alternatives in
