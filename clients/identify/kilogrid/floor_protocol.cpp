@@ -67,10 +67,15 @@ std::vector<const FloorRun*> FloorDays::searched() const {
 }
 
 std::size_t chosen_model(const std::vector<FloorScore>& path) {
-  constexpr double kSameMisfit = 0.02, kSameError = 0.01;
+  // Robots of a day differ: the error of those that are predicted is larger by two standard errors with a probability of 2.3 %, by
+  // chance alone.
+  constexpr double kSameMisfit = 0.02, kSameError = 0.01, kChance = 2;
   const auto eligible = [&](std::size_t k) {
-    // Negated, so that a number that is none does not pass.
-    return k == 0 || (path[k].misfit < path[0].misfit && path[k].rmse_mm <= path[0].rmse_mm * (1 + kSameError));
+    const FloorScore &model = path[k], &base = path[0];
+    // Written so that a number that is none does not pass.
+    const bool predicts =
+        model.rmse_mm <= base.rmse_mm * (1 + kSameError) || model.excess.mean_mm2 <= kChance * model.excess.se_mm2;
+    return k == 0 || (model.misfit < base.misfit && predicts);
   };
   double least = INFINITY;
   for (std::size_t k = 0; k < path.size(); ++k)

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "clients/identify/kilogrid/floor_log.hpp"
+#include "clients/identify/kilogrid/floor_validation.hpp"
 
 namespace kilotwin::kilogrid {
 
@@ -29,10 +30,11 @@ struct FloorDays {
 /// A model on the path of a search, on the days that choose.
 struct FloorScore {
   double misfit;
-  double rmse_mm;  ///< of the prediction of cells
+  double rmse_mm;      ///< of the prediction of cells
+  Excess excess = {};  ///< of that over the base model's
 };
-/// The index of the smallest model whose misfit is within 2 % of the least, the base model first. A model that predicts cells
-/// worse than the base model by more than 1 %, or whose misfit is not lower, is never chosen over it.
+/// The index of the smallest model whose misfit is within 2 % of the least, the base model first. A model is never chosen over the
+/// base model if its misfit is not lower, or if it predicts cells worse: by more than 1 %, and by more than two standard errors.
 [[nodiscard]] std::size_t chosen_model(const std::vector<FloorScore>& path);
 
 /// A record of the days on which searches were reported, in a file beside the data: a day that was looked at before is no longer

@@ -25,9 +25,17 @@ struct Predicted {
   CellPrediction at;
 };
 
-/// Predictions for some robots of each run, in its first part; appended to `all` if given.
+/// Predictions for some robots of each run, in its first part; appended to `all` if given. The result is the same for any number of
+/// threads.
 [[nodiscard]] Validation validate(const std::vector<FloorRun>& runs, const Floor&, const FloorSettings&,
-                                  double horizon_s, std::vector<Predicted>* all);
+                                  double horizon_s, std::uint32_t threads, std::vector<Predicted>* all);
+
+/// By how much the mean squared error of one model exceeds that of another, mm^2, and its standard error over robots.
+struct Excess {
+  double mean_mm2 = 0, se_mm2 = 0;
+};
+/// `a` less `b`, of the same robots and times; infinite if the robots differ.
+[[nodiscard]] Excess excess_of(const Validation& a, const Validation& b);
 /// rmse_mm with its 95 % interval over robots, rows, log_likelihood_per_report.
 [[nodiscard]] identification::Accuracy accuracy_of(const Validation&);
 

@@ -170,7 +170,6 @@ class FloorIdentification {
     return [this](const std::string& what) { say(what); };
   }
   FloorDays without_unlike_runs(FloorDays);
-  [[nodiscard]] FloorScore score_of(const FloorModel&) const;
   void drop(const std::vector<std::string>& kept);
   void refit();
   void add_caveats(const OpenedDays::Opened&);
@@ -266,19 +265,20 @@ void FloorIdentification::search() {
   }
 }
 
-FloorScore FloorIdentification::score_of(const FloorModel& model) const {
-  return {choosing_.misfit(simulated_statistics(choosing_, model.settings(), 4712, 2)),
-          validate(days_.choose, floor_, model.settings(), options_.horizon_s, nullptr).rmse_mm()};
-}
-
 void FloorIdentification::choose() {
   begin(kChoice, "last check");
   // Without elimination and without walls it is the last model already.
   if (model_.values != path_.back().model.values || names_of(model_) != path_.back().effects)
     path_.push_back({names_of(model_), model_});
   std::vector<FloorScore> scores;
+  Validation of_base;
   for (const FloorStage& stage : path_) {
-    scores.push_back(score_of(stage.model));
+    const FloorSettings settings = stage.model.settings();
+    const Validation cells =
+        validate(days_.choose, floor_, settings, options_.horizon_s, options_.threads, nullptr);
+    if (scores.empty()) of_base = cells;
+    scores.push_back({choosing_.misfit(simulated_statistics(choosing_, settings, 4712, 2)), cells.rmse_mm(),
+                      excess_of(cells, of_base)});
     identification::CheckedModel& checked = *out().mutable_check()->add_path();
     assign(checked.mutable_effects(), stage.effects);
     checked.set_rmse_mm(scores.back().rmse_mm);
@@ -329,7 +329,7 @@ void FloorIdentification::refit() {
 
 JudgedModel FloorIdentification::judged(const FloorModel& model, std::uint64_t seed,
                                         std::vector<Predicted>& to) const {
-  JudgedModel out{validate(days_.report, floor_, model.settings(), options_.horizon_s, &to),
+  JudgedModel out{validate(days_.report, floor_, model.settings(), options_.horizon_s, options_.threads, &to),
                   simulated_statistics(held_out_, model.settings(), seed, 2), 0};
   out.misfit = held_out_.misfit(out.statistics);
   return out;
@@ -353,7 +353,8 @@ identification::Effect FloorIdentification::judged_effect(std::size_t e) {
   const std::string name = name_of(model_, e);
   const bool is_wall = name == kWallEffect;
   const double misfit = held_out_.misfit(simulated_statistics(held_out_, less.settings(), 79));
-  const Validation lesser = validate(days_.report, floor_, less.settings(), options_.horizon_s, nullptr);
+  const Validation lesser =
+      validate(days_.report, floor_, less.settings(), options_.horizon_s, options_.threads, nullptr);
   const double gain_nat = after_.cells.log_likelihood - lesser.log_likelihood;
   identification::Effect effect;
   effect.set_name(name);

@@ -68,12 +68,41 @@ TEST(FloorProtocol, TooFewDaysChooseAndReportAtOnce) {
 }
 
 TEST(FloorProtocol, AModelThatPredictsWorseThanTheBaseIsNotChosen) {
-  EXPECT_EQ(chosen_model({{100, 80}, {120, 79}, {140, 78}}), 0U) << "larger misfits";
-  EXPECT_EQ(chosen_model({{100, 80}, {60, 79}, {140, 78}}), 1U) << "the last effect does harm";
-  EXPECT_EQ(chosen_model({{100, 80}, {60, 79}, {59.5, 78}}), 1U) << "the smaller of two that are alike";
-  EXPECT_EQ(chosen_model({{100, 80}, {60, 95}}), 0U) << "cells are predicted worse";
-  EXPECT_EQ(chosen_model({{100, 80}, {std::nan(""), 70}}), 0U);
-  EXPECT_EQ(chosen_model({{100, 80}, {60, 79}, {40, 78}}), 2U);
+  const auto worse = [](double mean_mm2) { return Excess{mean_mm2, 50}; };
+  EXPECT_EQ(chosen_model({{100, 80}, {120, 79, worse(-159)}, {140, 78, worse(-316)}}), 0U) << "larger misfits";
+  EXPECT_EQ(chosen_model({{100, 80}, {60, 79, worse(-159)}, {140, 78, worse(-316)}}), 1U)
+      << "the last effect does harm";
+  EXPECT_EQ(chosen_model({{100, 80}, {60, 79, worse(-159)}, {59.5, 78, worse(-316)}}), 1U)
+      << "the smaller of two that are alike";
+  EXPECT_EQ(chosen_model({{100, 80}, {60, 95, worse(2625)}}), 0U) << "cells are predicted worse";
+  EXPECT_EQ(chosen_model({{100, 80}, {60, 82, {324, 200}}}), 1U) << "by 2.5 %, but within chance";
+  EXPECT_EQ(chosen_model({{100, 80}, {60, 82, {324, 50}}}), 0U) << "by 2.5 %, beyond chance";
+  EXPECT_EQ(chosen_model({{100, 80}, {60, 80.4, {64, 5}}}), 1U) << "beyond chance, but by 0.5 %";
+  EXPECT_EQ(chosen_model({{100, 80}, {std::nan(""), 70, worse(-1500)}}), 0U);
+  EXPECT_EQ(chosen_model({{100, 80}, {60, std::nan(""), {std::nan(""), 5}}}), 0U);
+  EXPECT_EQ(chosen_model({{100, 80}, {60, 79, worse(-159)}, {40, 78, worse(-316)}}), 2U);
+}
+
+TEST(FloorProtocol, TheExcessOfAnErrorIsOfPairedRobots) {
+  // Robots differ much, the models little: 1 mm^2 more for each row of each robot.
+  Validation base, model;
+  for (const double each_mm2 : {10.0, 400.0, 9000.0}) {
+    for (Validation* v : {&base, &model}) {
+      const double rows = 20, sum = rows * (each_mm2 + (v == &model ? 1 : 0));
+      v->sum += sum;
+      v->rows += 20;
+      v->by_robot.emplace_back(sum, rows);
+    }
+  }
+  EXPECT_NEAR(excess_of(model, base).mean_mm2, 1, 1e-9);
+  EXPECT_NEAR(excess_of(model, base).se_mm2, 0, 1e-9);
+  // One robot of three alone has it.
+  base.by_robot[2].first += 20, base.by_robot[1].first += 20, base.sum += 40;
+  const Excess one = excess_of(model, base);
+  EXPECT_NEAR(one.mean_mm2, 1.0 / 3, 1e-9);
+  EXPECT_NEAR(one.se_mm2, std::sqrt(4.0 / 9 + 1.0 / 9 + 1.0 / 9) / 3, 1e-9);
+  base.by_robot.pop_back();
+  EXPECT_EQ(excess_of(model, base).mean_mm2, INFINITY) << "other robots";
 }
 
 /// Days of a search, as open() takes them.
