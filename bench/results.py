@@ -156,13 +156,15 @@ def parser_of(doc: str) -> argparse.ArgumentParser:
 
 
 def command_of(program: str, name: str, arguments: argparse.Namespace, parser: argparse.ArgumentParser) -> str:
-    """The command that measures one part, with the options that were given. Measured data are named DATA."""
+    """The command that measures one part, with the options that were given. Directories of measured data are named DATA."""
     words = [program, "-w", *([name] if name else [])]
     for option, value in vars(arguments).items():
         if option in ("w", "b", "part") or value == parser.get_default(option):
             continue
         flag = "--" + option.replace("_", "-")
-        text = "DATA" if option == "data" else f"{value:g}" if isinstance(value, float) else shlex.quote(str(value))
+        # Directories of one's own machine.
+        place = {"data": "DATA", "found": "DIR"}.get(option)
+        text = place or (f"{value:g}" if isinstance(value, float) else shlex.quote(str(value)))
         words.append(flag if value is True else f"{flag}={text}" if " " in text or text.startswith("-") else f"{flag} {text}")
     return " ".join(words)
 
