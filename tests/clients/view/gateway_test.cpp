@@ -86,7 +86,7 @@ class HeldRun : public NotedRun {
   }
 
  private:
-  static constexpr std::chrono::seconds kLongest{30};
+  static constexpr std::chrono::seconds kLongest{90};
   std::mutex mutex_;
   std::condition_variable changed_;
   int plots_begun_ = 0, allowed_ = 0, robots_answered_ = 0;

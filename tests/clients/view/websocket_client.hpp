@@ -39,11 +39,11 @@ class WebSocketClient {
   /// As it is.
   void send_bytes(std::string_view bytes);
   /// The next message; nothing where none comes within `seconds` or the connection has ended.
-  [[nodiscard]] std::optional<Message> read(double seconds = 30);
+  [[nodiscard]] std::optional<Message> read(double seconds = 90);
   /// The next message of a type, others are passed over; "frame": the next binary one.
-  [[nodiscard]] std::optional<Message> await(std::string_view type, double seconds = 30);
+  [[nodiscard]] std::optional<Message> await(std::string_view type, double seconds = 90);
   /// Reads until the server has closed the connection. Returns the status of its close frame, 0 without one, -1 if it stays open.
-  [[nodiscard]] int closed(double seconds = 30);
+  [[nodiscard]] int closed(double seconds = 90);
 
  private:
   [[nodiscard]] bool receive(double seconds);
