@@ -1,13 +1,16 @@
 #include "services/behaviours/cycle_counters.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <span>
 #include <vector>
 
 #include "core/base/error.hpp"
 #include "services/behaviours/assembly.hpp"
+#include "services/behaviours/budget_register.hpp"
 #include "services/behaviours/constant_division.hpp"
 #include "services/behaviours/runtime/image_abi.h"
 
@@ -172,10 +175,14 @@ class Instrumenter {
       for (; next < counters_.size() && counters_[next].before == i; ++next) {
         emit(counters_[next], next, place, result, stubs);
       }
+      const bool keeps =
+          s.is_code(Statement::Kind::kInstruction) && flow_of(s) == Flow::kCall && may_overwrite_budget(s.operands);
+      if (keeps) result += "\tmovd\t" + register_ + ", " + memory_ + "\n";
       result.append(s.text).append(1, '\n');
+      if (keeps) result += "\tmovd\t" + memory_ + ", " + register_ + "\n";
     }
     if (!stubs.empty()) result.append("\t.text\n").append(stubs);
-    return result;
+    return result + constants();
   }
 
  private:
@@ -296,18 +303,31 @@ class Instrumenter {
     return false;
   }
 
-  static void emit(const Counter& c, std::uint32_t number, std::string_view place, std::string& code,
-                   std::string& stubs) {
-    const std::string count =
-        "\tsubl\t$" + std::to_string(std::max(c.cycles, 1u)) + ", %gs:" + std::to_string(KT_THREAD_BUDGET) + "\n";
+  /// The numbers of cycles that counters subtract, and the sign that tests look for: vectors of which the lowest 32 bits matter.
+  [[nodiscard]] std::string constants() const {
+    if (counts_.empty()) return "";
+    std::string text =
+        "\t.section\t.rodata.cst16,\"aM\",@progbits,16\n\t.balign\t16\n.Lkt_sign:\n\t.long\t0x80000000,0,0,0\n";
+    for (const unsigned count : counts_) {
+      const std::string number = std::to_string(count);
+      text += ".Lkt_count" + number + ":\n\t.long\t" + number + ",0,0,0\n";
+    }
+    return text;
+  }
+
+  void emit(const Counter& c, std::uint32_t number, std::string_view place, std::string& code, std::string& stubs) {
+    const unsigned cycles = std::max(c.cycles, 1u);
+    counts_.insert(cycles);
+    const std::string count = "\tpsubd\t.Lkt_count" + std::to_string(cycles) + "(%rip), " + register_ + "\n";
+    const std::string test = "\tptest\t.Lkt_sign(%rip), " + register_ + "\n";
     const std::string id = std::to_string(number), preempt = "kt_preempt_" + std::to_string(c.kind) + "\n";
     if (!c.tests) {
       code += count;
     } else if (c.keeps_flags) {
-      code += "\tpushfq\n" + count + "\tjns\t.Lkt_back" + id + "\n\tcall\t" + preempt + ".Lkt_back" + id +
+      code += "\tpushfq\n" + count + test + "\tjz\t.Lkt_back" + id + "\n\tcall\t" + preempt + ".Lkt_back" + id +
               ":\n\tpopfq\n";
     } else {
-      code += count + "\tjs\t.Lkt_out" + id + "\n.Lkt_back" + id + ":\n";
+      code += count + test + "\tjnz\t.Lkt_out" + id + "\n.Lkt_back" + id + ":\n";
       stubs.append(".Lkt_out" + id + ":\n").append(place).append(place.empty() ? "" : "\n");
       // A call written as push and jump, because it is not matched by a return: see switch.c.
       stubs.append("\tleaq\t-8(%rsp), %rsp\n\tpushq\t%rax\n\tleaq\t.Lkt_back" + id +
@@ -315,6 +335,7 @@ class Instrumenter {
     }
   }
 
+  const std::string register_{kBudgetRegister}, memory_ = "%gs:" + std::to_string(offsetof(KtThread, budget));
   std::string_view assembly_;
   const Counted counted_;
   const std::vector<Statement> statements_;
@@ -322,12 +343,14 @@ class Instrumenter {
   const Cycles cycles_;
   const std::vector<bool> needs_flags_;
   std::vector<Counter> counters_;
+  std::set<unsigned> counts_;  ///< the cycles of the counters
 };
 
 }  // namespace
 
 std::string with_cycle_counters(std::string_view assembly, Counted counted) {
-  return Instrumenter(assembly, counted).instrument();
+  const std::string free = with_free_budget_register(assembly);
+  return Instrumenter(free, counted).instrument();
 }
 
 }  // namespace kilotwin::behaviours
