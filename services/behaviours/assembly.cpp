@@ -202,6 +202,46 @@ bool reads_memory(const Statement& instruction) {
 
 namespace {
 
+/// The last operand, which AT&T syntax changes.
+std::string_view last_operand(std::string_view operands) {
+  std::size_t first = 0;
+  int depth = 0;
+  for (std::size_t at = 0; at < operands.size(); ++at) {
+    if (operands[at] == '(') ++depth;
+    if (operands[at] == ')') --depth;
+    if (operands[at] == ',' && depth == 0) first = at + 1;
+  }
+  return trimmed(operands.substr(first));
+}
+
+bool is_memory(std::string_view operand) {
+  if (operand.empty() || operand[0] == '$') return false;
+  return operand[0] != '%' || operand.find(':') != std::string_view::npos;
+}
+
+/// A fixed place relative to the stack pointer: of the function's own frame, or of arguments to functions that it calls.
+bool is_own_frame(std::string_view operand) {
+  return operand.ends_with("(%rsp)") && operand.find_first_not_of("-0123456789") == operand.size() - 6;
+}
+
+}  // namespace
+
+bool may_write_memory(const Statement& instruction) {
+  const std::string_view name = instruction.name, operands = instruction.operands;
+  if (flow_of(instruction) != Flow::kNext || name.starts_with("nop")) return false;
+  if (operands.empty()) return name.starts_with("stos") || name.starts_with("movs");
+  if (name.starts_with("xchg") || name.starts_with("xadd") || name.starts_with("cmpxchg")) return true;
+  constexpr std::array<std::string_view, 12> kReading{"cmp",  "test", "ucomis", "comis", "push", "mul",
+                                                      "imul", "div",  "idiv",   "fld",   "fild", "prefetch"};
+  for (const std::string_view start : kReading) {
+    if (name.starts_with(start)) return false;
+  }
+  const std::string_view changed = last_operand(operands);
+  return is_memory(changed) && !is_own_frame(changed);
+}
+
+namespace {
+
 /// Symbols that instructions or data refer to: functions, jump targets, and labels whose address is taken.
 struct Mentioned {
   std::set<std::string_view> functions, jumped_to, taken;

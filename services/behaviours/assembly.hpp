@@ -43,6 +43,10 @@ inline constexpr std::string_view kBudgetRegister = "%xmm15";
 /// stack frame, and the global offset table do not count.
 [[nodiscard]] bool reads_memory(const Statement& instruction);
 
+/// Whether an instruction may write memory other than the running function's own stack frame at a fixed offset from %rsp. Writes of
+/// called functions do not count. May be true of an instruction that writes nothing.
+[[nodiscard]] bool may_write_memory(const Statement& instruction);
+
 /// Control-flow graph: the basic blocks of all code, in the order of the text.
 struct FlowGraph {
   struct Block {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/base/error.hpp"
@@ -190,7 +191,8 @@ class Instrumenter {
     std::uint32_t before = 0;  ///< index of the statement before which the counter stands
     std::uint32_t cycles = 0;
     bool tests = false, keeps_flags = false;
-    unsigned kind = 0;  ///< KT_CHECK_*
+    bool writes = false;  ///< code that follows may write memory: runtime/budget.h
+    unsigned kind = 0;    ///< KT_CHECK_*
   };
 
   [[nodiscard]] unsigned cycles_of(const FlowGraph::Block& block, std::uint32_t i) const {
@@ -240,6 +242,7 @@ class Instrumenter {
         after_call = after_call || flow_of(s) == Flow::kCall;
       }
       add(b, counter, first);
+      note_writes(b, first);
     }
     verify();
   }
@@ -257,6 +260,32 @@ class Instrumenter {
     const Cycles left(rest, statements_);
     if (std::find(left.closes.begin(), left.closes.end(), true) != left.closes.end())
       throw RunError("a loop of this program cannot be interrupted; this is an error of kilotwin");
+  }
+
+  /// Notes writes of block `b`, whose counters begin with number `first`. Calls and the runtime's own looks at the register divide a
+  /// block: each part with a write has a counter before it, a further one if need be. That one changes no flags.
+  void note_writes(std::uint32_t b, std::size_t first) {
+    const FlowGraph::Block& block = graph_.blocks[b];
+    std::uint32_t part = block.first;
+    bool noted = false;
+    for (std::uint32_t i = block.first; i < block.last; ++i) {
+      const Statement& s = statements_[i];
+      if (s.kind != Statement::Kind::kInstruction) continue;
+      if (flow_of(s) == Flow::kCall || uses_budget(s)) {
+        part = i + 1;
+        noted = false;
+      }
+      if (noted || !may_write_memory(s)) continue;
+      noted = true;
+      const auto own = std::find_if(counters_.begin() + static_cast<std::ptrdiff_t>(first), counters_.end(),
+                                    [&](const Counter& c) { return c.before >= part && c.before <= i; });
+      if (own != counters_.end())
+        own->writes = true;
+      else
+        counters_.push_back({.before = i, .writes = true});
+    }
+    std::stable_sort(counters_.begin() + static_cast<std::ptrdiff_t>(first), counters_.end(),
+                     [](const Counter& a, const Counter& c) { return a.before < c.before; });
   }
 
   [[nodiscard]] std::uint32_t first_instruction(const FlowGraph::Block& block) const {
@@ -303,22 +332,24 @@ class Instrumenter {
     return false;
   }
 
-  /// The numbers of cycles that counters subtract, and the sign that tests look for: vectors of which the lowest 32 bits matter.
+  /// The vectors that counters subtract, and the sign that tests look for.
   [[nodiscard]] std::string constants() const {
     if (counts_.empty()) return "";
     std::string text =
         "\t.section\t.rodata.cst16,\"aM\",@progbits,16\n\t.balign\t16\n.Lkt_sign:\n\t.long\t0x80000000,0,0,0\n";
-    for (const unsigned count : counts_) {
-      const std::string number = std::to_string(count);
-      text += ".Lkt_count" + number + ":\n\t.long\t" + number + ",0,0,0\n";
-    }
+    for (const auto& [cycles, writes] : counts_)
+      text +=
+          name_of(cycles, writes) + ":\n\t.long\t" + std::to_string(cycles) + (writes ? ",1,0,0\n" : ",0,0,0\n");
     return text;
+  }
+  static std::string name_of(unsigned cycles, bool writes) {
+    return ".Lkt_count" + std::to_string(cycles) + (writes ? "w" : "");
   }
 
   void emit(const Counter& c, std::uint32_t number, std::string_view place, std::string& code, std::string& stubs) {
-    const unsigned cycles = std::max(c.cycles, 1u);
-    counts_.insert(cycles);
-    const std::string count = "\tpsubd\t.Lkt_count" + std::to_string(cycles) + "(%rip), " + register_ + "\n";
+    const unsigned cycles = std::max(c.cycles, c.tests ? 1u : 0u);
+    counts_.insert({cycles, c.writes});
+    const std::string count = "\tpsubd\t" + name_of(cycles, c.writes) + "(%rip), " + register_ + "\n";
     const std::string test = "\tptest\t.Lkt_sign(%rip), " + register_ + "\n";
     const std::string id = std::to_string(number), preempt = "kt_preempt_" + std::to_string(c.kind) + "\n";
     if (!c.tests) {
@@ -343,7 +374,7 @@ class Instrumenter {
   const Cycles cycles_;
   const std::vector<bool> needs_flags_;
   std::vector<Counter> counters_;
-  std::set<unsigned> counts_;  ///< the cycles of the counters
+  std::set<std::pair<unsigned, bool>> counts_;  ///< cycles and writes of the counters
 };
 
 }  // namespace

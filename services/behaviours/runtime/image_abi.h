@@ -7,7 +7,7 @@
 #include "core/base/motor_phases.h"
 
 #define KT_IMAGE_MAGIC 0x6e6977746f6c696bu /* "kilotwin" */
-#define KT_IMAGE_VERSION 11u
+#define KT_IMAGE_VERSION 12u
 /* Size of the buffer for text that a robot prints in one tick. A serial line of 38400 baud sends 126 octets per tick. */
 #define KT_LOG_OCTETS 3584
 /* Section of the heap. It is the last of a robot's memory, so that only its used part need be saved. */
@@ -85,10 +85,15 @@ struct KtRobot {
   uint8_t loop_rate;    /* host: KT_LOOP_* */
   uint8_t looped;       /* host: the tick ended in a loop that reads no memory that an interrupt may change */
   uint8_t spent;        /* host: 0; 1: the program has spent time in a delay or in a call, or changed motors */
-  uint8_t returned;     /* host: 0; 1: loop() has returned as often as the host wants to know */
+  uint8_t
+      returned; /* host: 0; KT_RETURNED: loop() has returned as often as the host wants to know; KT_RETURNED_UNCHANGED: and
+                           the last call has written no memory */
 };
 
 #define KT_BLOCKED_UNIT 256u
+
+#define KT_RETURNED 1u
+#define KT_RETURNED_UNCHANGED 2u
 
 /* The running callback. */
 #define KT_IN_TX_SUCCESS 1u

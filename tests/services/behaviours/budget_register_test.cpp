@@ -1,8 +1,10 @@
-// The register of the cycle budget: compilers' own use of it gets another register, in the text and in programs that run.
+// The register of the cycle budget: compilers' own use of it gets another register, in the text and in programs that run. Its second
+// part counts writes.
 #include "services/behaviours/budget_register.hpp"
 
 #include <gtest/gtest.h>
 
+#include "services/behaviours/assembly.hpp"
 #include "services/behaviours/cycle_counters.hpp"
 #include "tests/services/behaviours/swarm.hpp"
 
@@ -53,6 +55,39 @@ TEST(BudgetRegister, IsKeptWhileComplexNumbersAreMultiplied) {
   const std::string text = with_cycle_counters(function("f", "\tcall\t__muldc3@PLT\n\tcall\tother\n"));
   EXPECT_TRUE(has(text, "\tmovd\t%xmm15, %gs:24\n\tcall\t__muldc3@PLT\n\tmovd\t%gs:24, %xmm15\n")) << text;
   EXPECT_FALSE(has(text, "\tmovd\t%xmm15, %gs:24\n\tcall\tother")) << text;
+}
+
+bool writes(const std::string& instruction) {
+  const std::vector<Statement> statements = read_assembly(instruction);
+  return may_write_memory(statements.at(0));
+}
+
+TEST(Writes, AreRecognised) {
+  for (const char* one :
+       {"movb %al, count(%rip)", "movl %eax, (%rdi)", "addl $1, 4(%rsp,%rax)", "movl %eax, -8(%rbp)", "sete (%rax)",
+        "incw n(%rip)", "movl $1, 32", "movl %eax, %gs:40", "rep stosq", "movsq", "rep;movsq (%rsi), %es:(%rdi)",
+        "xchgl (%rdi), %eax", "lock cmpxchgl %ecx, (%rdx)", "movups %xmm0, (%rax)", "fstpt (%rdi)", "popq (%rax)"})
+    EXPECT_TRUE(writes(one)) << one;
+  for (const char* one : {"movb count(%rip), %al", "cmpl $9, (%rdi)", "testb $1, (%rdi)", "leaq 8(%rdi), %rax",
+                          "movl %eax, 12(%rsp)", "movl %eax, (%rsp)", "pushq (%rdi)", "call *8(%rax)",
+                          "jmp *(%rax)", "addl (%rdi), %eax", "imull n(%rip), %eax", "idivl (%rdi)",
+                          "nopw 0(%rax,%rax,1)", "ucomisd (%rax), %xmm0", "ret", "cltq", "fldt (%rdi)"})
+    EXPECT_FALSE(writes(one)) << one;
+}
+
+TEST(Writes, AreNotedAfterTheCallThatPrecedesThem) {
+  const std::string text = with_cycle_counters(
+      function("f", "\tcall\tother\n\tmovl\t%eax, n(%rip)\n\tmovl\t%eax, m(%rip)\n"), Counted::kTestsOnly);
+  EXPECT_TRUE(has(
+      text, "\tcall\tother\n\tpsubd\t.Lkt_count0w(%rip), %xmm15\n\tmovl\t%eax, n(%rip)\n\tmovl\t%eax, m(%rip)\n"))
+      << text;
+  EXPECT_TRUE(has(text, ".Lkt_count0w:\n\t.long\t0,1,0,0\n")) << text;
+}
+
+TEST(Writes, ShareACounterWhereTheyCan) {
+  const std::string text = with_cycle_counters(function("f", "\tmovl\t%edi, n(%rip)\n"));
+  EXPECT_TRUE(has(text, "w(%rip), %xmm15\n\tmovl\t%edi, n(%rip)\n")) << text;
+  EXPECT_FALSE(has(text, ".Lkt_count0w")) << text;
 }
 
 TEST(BudgetRegister, AProgramOfManyFloatsRunsAcrossTicks) {
