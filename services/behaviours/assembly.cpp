@@ -62,7 +62,8 @@ class Reader {
  private:
   void line(std::string_view text) {
     const std::string_view content = trimmed(text);
-    if (content.empty() || content[0] == '#') return add({Statement::Kind::kNothing, section_, text, {}, {}});
+    if (content == "#APP" || content == "#NO_APP") in_asm_ = content == "#APP";
+    if (content.empty() || content[0] == '#') return add(Statement::Kind::kNothing, text, {}, {});
     // A directive may hold arbitrary text in quotes, so it is not split further.
     if (content[0] == '.' && content.find(':') == std::string_view::npos) return directive(text, content);
     if (const std::string_view symbol = first_symbol(content);
@@ -84,7 +85,7 @@ class Reader {
     std::string_view content = trimmed(text);
     const std::string_view symbol = first_symbol(content);
     if (!symbol.empty() && symbol.size() < content.size() && content[symbol.size()] == ':') {
-      add({Statement::Kind::kLabel, section_, content.substr(0, symbol.size() + 1), symbol, {}});
+      add(Statement::Kind::kLabel, content.substr(0, symbol.size() + 1), symbol, {});
       return statement(content.substr(symbol.size() + 1));
     }
     if (content.empty()) return;
@@ -95,7 +96,7 @@ class Reader {
       name = rest.substr(0, rest.find_first_of(kBlankOrSemicolon));
       rest.remove_prefix(std::min(rest.size(), rest.find_first_not_of(kBlankOrSemicolon, name.size())));
     } while (is_prefix(name) && !rest.empty());
-    add({Statement::Kind::kInstruction, section_, text, name, rest});
+    add(Statement::Kind::kInstruction, text, name, rest);
   }
 
   void directive(std::string_view text, std::string_view content) {
@@ -115,12 +116,15 @@ class Reader {
                  : operands.starts_with(".debug") ? Statement::Section::kDebug
                                                   : Statement::Section::kData;
     }
-    add({Statement::Kind::kDirective, section_, text, name, operands});
+    add(Statement::Kind::kDirective, text, name, operands);
   }
 
-  void add(const Statement& statement) { statements_.push_back(statement); }
+  void add(Statement::Kind kind, std::string_view text, std::string_view name, std::string_view operands) {
+    statements_.push_back({kind, section_, in_asm_, text, name, operands});
+  }
 
   std::string_view rest_;
+  bool in_asm_ = false;
   Statement::Section section_ = Statement::Section::kCode, before_ = section_;
   std::vector<Statement::Section> outer_;
   std::vector<Statement> statements_;
@@ -167,19 +171,25 @@ bool overwrites_flags(std::string_view name) {
          name.starts_with("ret");
 }
 
+bool uses_budget(const Statement& instruction) {
+  return instruction.in_asm && instruction.operands.find(kBudgetRegister) != std::string_view::npos;
+}
+
 bool uses_vectors(const Statement& instruction) {
+  if (uses_budget(instruction)) return false;
   return instruction.operands.find("%xmm") != std::string_view::npos ||
          instruction.operands.find("%mm") != std::string_view::npos || instruction.name.starts_with("f");
 }
 
 bool reads_memory(const Statement& instruction) {
   const std::string_view name = instruction.name, operands = instruction.operands;
+  // The budget changes from tick to tick.
+  if (uses_budget(instruction)) return true;
   if (name.starts_with("lea") || name.starts_with("nop") || name.starts_with("prefetch")) return false;
   for (const std::string_view start : {"lods", "scas", "cmps", "movs"}) {
     if (name.starts_with(start) && operands.find("(%rsi)") != std::string_view::npos) return true;
   }
   const std::string_view memory = memory_operand(operands);
-  // A read of %gs counts as well: it is the remaining budget of cycles, which changes from tick to tick.
   if (memory.empty())
     return operands.find("%fs:") != std::string_view::npos || operands.find("%gs:") != std::string_view::npos;
   if (memory.find("(%rsp") != std::string_view::npos || memory.find("(%rbp") != std::string_view::npos ||
@@ -188,6 +198,46 @@ bool reads_memory(const Statement& instruction) {
   }
   const bool is_store = name.starts_with("mov") && operands.ends_with(memory);
   return !is_store && !name.starts_with("set");
+}
+
+namespace {
+
+/// The last operand, which AT&T syntax changes.
+std::string_view last_operand(std::string_view operands) {
+  std::size_t first = 0;
+  int depth = 0;
+  for (std::size_t at = 0; at < operands.size(); ++at) {
+    if (operands[at] == '(') ++depth;
+    if (operands[at] == ')') --depth;
+    if (operands[at] == ',' && depth == 0) first = at + 1;
+  }
+  return trimmed(operands.substr(first));
+}
+
+bool is_memory(std::string_view operand) {
+  if (operand.empty() || operand[0] == '$') return false;
+  return operand[0] != '%' || operand.find(':') != std::string_view::npos;
+}
+
+/// A fixed place relative to the stack pointer: of the function's own frame, or of arguments to functions that it calls.
+bool is_own_frame(std::string_view operand) {
+  return operand.ends_with("(%rsp)") && operand.find_first_not_of("-0123456789") == operand.size() - 6;
+}
+
+}  // namespace
+
+bool may_write_memory(const Statement& instruction) {
+  const std::string_view name = instruction.name, operands = instruction.operands;
+  if (flow_of(instruction) != Flow::kNext || name.starts_with("nop")) return false;
+  if (operands.empty()) return name.starts_with("stos") || name.starts_with("movs");
+  if (name.starts_with("xchg") || name.starts_with("xadd") || name.starts_with("cmpxchg")) return true;
+  constexpr std::array<std::string_view, 12> kReading{"cmp",  "test", "ucomis", "comis", "push", "mul",
+                                                      "imul", "div",  "idiv",   "fld",   "fild", "prefetch"};
+  for (const std::string_view start : kReading) {
+    if (name.starts_with(start)) return false;
+  }
+  const std::string_view changed = last_operand(operands);
+  return is_memory(changed) && !is_own_frame(changed);
 }
 
 namespace {

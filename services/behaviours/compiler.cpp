@@ -11,6 +11,7 @@
 #include "core/base/error.hpp"
 #include "core/os/files.hpp"
 #include "core/os/process.hpp"
+#include "services/behaviours/budget_register.hpp"
 #include "services/behaviours/companions.hpp"
 #include "services/behaviours/compiler_common.hpp"
 #include "services/behaviours/cycle_counters.hpp"
@@ -218,7 +219,17 @@ std::string counted_assembly(const Arguments& compiler, const fs::path& source, 
   // The error is to name the columns of the source, which the robot's int shifts.
   if (robot_int && needs_code_on_stack(*assembly)) throw NeedsWideInt{};
   refuse_code_on_stack(*assembly, arguments, sources, place);
-  return with_cycle_counters(*assembly);
+  try {
+    return with_cycle_counters(*assembly);
+  } catch (const NeedsAllVectorRegisters& one) {
+    // gcc can do without the register; its other code may change with it.
+    arguments.emplace_back("-ffixed-xmm15");
+    assembly = assembly_of(arguments, place, errors);
+    if (assembly) return with_cycle_counters(*assembly);
+    throw UserError(sources.front().string() + ":1:1: error: " + one.function +
+                    "() computes with more floating-point values at a time than fit into registers; split it, or "
+                    "compile with gcc");
+  }
 }
 
 /// The runtime as one object file, cached per compiler.

@@ -1,13 +1,17 @@
 #include "services/behaviours/cycle_counters.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/base/error.hpp"
 #include "services/behaviours/assembly.hpp"
+#include "services/behaviours/budget_register.hpp"
 #include "services/behaviours/constant_division.hpp"
 #include "services/behaviours/runtime/image_abi.h"
 
@@ -172,10 +176,14 @@ class Instrumenter {
       for (; next < counters_.size() && counters_[next].before == i; ++next) {
         emit(counters_[next], next, place, result, stubs);
       }
+      const bool keeps =
+          s.is_code(Statement::Kind::kInstruction) && flow_of(s) == Flow::kCall && may_overwrite_budget(s.operands);
+      if (keeps) result += "\tmovd\t" + register_ + ", " + memory_ + "\n";
       result.append(s.text).append(1, '\n');
+      if (keeps) result += "\tmovd\t" + memory_ + ", " + register_ + "\n";
     }
     if (!stubs.empty()) result.append("\t.text\n").append(stubs);
-    return result;
+    return result + constants();
   }
 
  private:
@@ -183,7 +191,8 @@ class Instrumenter {
     std::uint32_t before = 0;  ///< index of the statement before which the counter stands
     std::uint32_t cycles = 0;
     bool tests = false, keeps_flags = false;
-    unsigned kind = 0;  ///< KT_CHECK_*
+    bool writes = false;  ///< code that follows may write memory: runtime/budget.h
+    unsigned kind = 0;    ///< KT_CHECK_*
   };
 
   [[nodiscard]] unsigned cycles_of(const FlowGraph::Block& block, std::uint32_t i) const {
@@ -233,6 +242,7 @@ class Instrumenter {
         after_call = after_call || flow_of(s) == Flow::kCall;
       }
       add(b, counter, first);
+      note_writes(b, first);
     }
     verify();
   }
@@ -250,6 +260,32 @@ class Instrumenter {
     const Cycles left(rest, statements_);
     if (std::find(left.closes.begin(), left.closes.end(), true) != left.closes.end())
       throw RunError("a loop of this program cannot be interrupted; this is an error of kilotwin");
+  }
+
+  /// Notes writes of block `b`, whose counters begin with number `first`. Calls and the runtime's own looks at the register divide a
+  /// block: each part with a write has a counter before it, a further one if need be. That one changes no flags.
+  void note_writes(std::uint32_t b, std::size_t first) {
+    const FlowGraph::Block& block = graph_.blocks[b];
+    std::uint32_t part = block.first;
+    bool noted = false;
+    for (std::uint32_t i = block.first; i < block.last; ++i) {
+      const Statement& s = statements_[i];
+      if (s.kind != Statement::Kind::kInstruction) continue;
+      if (flow_of(s) == Flow::kCall || uses_budget(s)) {
+        part = i + 1;
+        noted = false;
+      }
+      if (noted || !may_write_memory(s)) continue;
+      noted = true;
+      const auto own = std::find_if(counters_.begin() + static_cast<std::ptrdiff_t>(first), counters_.end(),
+                                    [&](const Counter& c) { return c.before >= part && c.before <= i; });
+      if (own != counters_.end())
+        own->writes = true;
+      else
+        counters_.push_back({.before = i, .writes = true});
+    }
+    std::stable_sort(counters_.begin() + static_cast<std::ptrdiff_t>(first), counters_.end(),
+                     [](const Counter& a, const Counter& c) { return a.before < c.before; });
   }
 
   [[nodiscard]] std::uint32_t first_instruction(const FlowGraph::Block& block) const {
@@ -296,18 +332,33 @@ class Instrumenter {
     return false;
   }
 
-  static void emit(const Counter& c, std::uint32_t number, std::string_view place, std::string& code,
-                   std::string& stubs) {
-    const std::string count =
-        "\tsubl\t$" + std::to_string(std::max(c.cycles, 1u)) + ", %gs:" + std::to_string(KT_THREAD_BUDGET) + "\n";
+  /// The vectors that counters subtract, and the sign that tests look for.
+  [[nodiscard]] std::string constants() const {
+    if (counts_.empty()) return "";
+    std::string text =
+        "\t.section\t.rodata.cst16,\"aM\",@progbits,16\n\t.balign\t16\n.Lkt_sign:\n\t.long\t0x80000000,0,0,0\n";
+    for (const auto& [cycles, writes] : counts_)
+      text +=
+          name_of(cycles, writes) + ":\n\t.long\t" + std::to_string(cycles) + (writes ? ",1,0,0\n" : ",0,0,0\n");
+    return text;
+  }
+  static std::string name_of(unsigned cycles, bool writes) {
+    return ".Lkt_count" + std::to_string(cycles) + (writes ? "w" : "");
+  }
+
+  void emit(const Counter& c, std::uint32_t number, std::string_view place, std::string& code, std::string& stubs) {
+    const unsigned cycles = std::max(c.cycles, c.tests ? 1u : 0u);
+    counts_.insert({cycles, c.writes});
+    const std::string count = "\tpsubd\t" + name_of(cycles, c.writes) + "(%rip), " + register_ + "\n";
+    const std::string test = "\tptest\t.Lkt_sign(%rip), " + register_ + "\n";
     const std::string id = std::to_string(number), preempt = "kt_preempt_" + std::to_string(c.kind) + "\n";
     if (!c.tests) {
       code += count;
     } else if (c.keeps_flags) {
-      code += "\tpushfq\n" + count + "\tjns\t.Lkt_back" + id + "\n\tcall\t" + preempt + ".Lkt_back" + id +
+      code += "\tpushfq\n" + count + test + "\tjz\t.Lkt_back" + id + "\n\tcall\t" + preempt + ".Lkt_back" + id +
               ":\n\tpopfq\n";
     } else {
-      code += count + "\tjs\t.Lkt_out" + id + "\n.Lkt_back" + id + ":\n";
+      code += count + test + "\tjnz\t.Lkt_out" + id + "\n.Lkt_back" + id + ":\n";
       stubs.append(".Lkt_out" + id + ":\n").append(place).append(place.empty() ? "" : "\n");
       // A call written as push and jump, because it is not matched by a return: see switch.c.
       stubs.append("\tleaq\t-8(%rsp), %rsp\n\tpushq\t%rax\n\tleaq\t.Lkt_back" + id +
@@ -315,6 +366,7 @@ class Instrumenter {
     }
   }
 
+  const std::string register_{kBudgetRegister}, memory_ = "%gs:" + std::to_string(offsetof(KtThread, budget));
   std::string_view assembly_;
   const Counted counted_;
   const std::vector<Statement> statements_;
@@ -322,12 +374,14 @@ class Instrumenter {
   const Cycles cycles_;
   const std::vector<bool> needs_flags_;
   std::vector<Counter> counters_;
+  std::set<std::pair<unsigned, bool>> counts_;  ///< cycles and writes of the counters
 };
 
 }  // namespace
 
 std::string with_cycle_counters(std::string_view assembly, Counted counted) {
-  return Instrumenter(assembly, counted).instrument();
+  const std::string free = with_free_budget_register(assembly);
+  return Instrumenter(free, counted).instrument();
 }
 
 }  // namespace kilotwin::behaviours

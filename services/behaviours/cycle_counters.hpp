@@ -9,14 +9,15 @@
 namespace kilotwin::behaviours {
 
 /// Part of the cache key of compiled programs. Raise it when this pass or with_loop_barriers() changes its output.
-inline constexpr int kCountersVersion = 15;
+inline constexpr int kCountersVersion = 17;
 
-/// kTestsOnly counts one cycle per test and nothing else. It is for kilolib, which a robot runs in another form.
+/// kTestsOnly counts one cycle per test, and no others. It is for kilolib, which a robot runs in another form.
 enum class Counted : bool { kAll, kTestsOnly };
 /// Adds counters to a compiler's assembly. Each basic block gets a counter. At least one block of every cycle of the control-flow
 /// graph, and the entry of every function that calls another, also tests whether the budget is used up. So does long straight
-/// code, because interrupts come at tests. The code must be compiled
-/// with -mno-red-zone. Throws RunError if a cycle has no test, which would be a defect of this function.
+/// code, because interrupts come at tests. Blocks that may write memory say so: runtime/budget.h. The code must be compiled
+/// with -mno-red-zone. Throws RunError if a cycle has no test, which would be a defect of this function, and
+/// NeedsAllVectorRegisters: budget_register.hpp.
 [[nodiscard]] std::string with_cycle_counters(std::string_view assembly, Counted counted = Counted::kAll);
 
 /// Cycles of the robot's division routines, with their calls: means over dividends, avr-libgcc as of avr-gcc 5.4.

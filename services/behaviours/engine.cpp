@@ -474,8 +474,9 @@ Executor::Main BehavioursEngine::run_loops(std::uint32_t i, const Executor& exec
     const std::int32_t used = cycles - main.left;
     all_calls += calls;
     cycles = main.left;
+    const bool unchanged = calls == 1 && robot.returned == KT_RETURNED_UNCHANGED;
     if (robot.spent == 0 && exchange.log_length == printed &&
-        memory.settles(span.program, span.slot, executor.data_octets(), thread)) {
+        (unchanged || memory.settles(span.program, span.slot, executor.data_octets(), thread))) {
       span.kept = true;
       if (calls == 1 || used <= 0 || cycles <= 0) {
         if (calls == 1 && cycles > 0) span.call_cycles = used;

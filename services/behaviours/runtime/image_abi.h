@@ -7,7 +7,7 @@
 #include "core/base/motor_phases.h"
 
 #define KT_IMAGE_MAGIC 0x6e6977746f6c696bu /* "kilotwin" */
-#define KT_IMAGE_VERSION 10u
+#define KT_IMAGE_VERSION 12u
 /* Size of the buffer for text that a robot prints in one tick. A serial line of 38400 baud sends 126 octets per tick. */
 #define KT_LOG_OCTETS 3584
 /* Section of the heap. It is the last of a robot's memory, so that only its used part need be saved. */
@@ -18,8 +18,10 @@ struct KtThread {
   uint64_t host_stack;      /* the host's stack pointer while robot code runs */
   uint64_t robot_stack;     /* the main program's stack pointer while it waits */
   uint64_t interrupt_stack; /* initial stack pointer of callbacks */
-  int32_t budget;           /* cycles left; at the first test that finds it below 0, control returns to the host */
-  uint8_t check;            /* KT_CHECK_* of that test */
+  int32_t
+      budget; /* cycles left; at the first test that finds it below 0, control returns to the host. While robot code runs:
+                     budget.h */
+  uint8_t check; /* KT_CHECK_* of that test */
   uint8_t in_interrupt;
   uint8_t overrun; /* a callback has used up its budget */
   uint8_t reserved;
@@ -27,7 +29,6 @@ struct KtThread {
   int32_t held;   /* cycles of this tick that the host has not yet added to the budget */
   uint32_t unused;
 };
-#define KT_THREAD_BUDGET 24
 #define KT_THREAD_HELD 40
 
 /* Properties of a test's place. WAITS: the loop reads memory that an interrupt may change, or there is no loop. ENDLESS: the
@@ -84,10 +85,15 @@ struct KtRobot {
   uint8_t loop_rate;    /* host: KT_LOOP_* */
   uint8_t looped;       /* host: the tick ended in a loop that reads no memory that an interrupt may change */
   uint8_t spent;        /* host: 0; 1: the program has spent time in a delay or in a call, or changed motors */
-  uint8_t returned;     /* host: 0; 1: loop() has returned as often as the host wants to know */
+  uint8_t
+      returned; /* host: 0; KT_RETURNED: loop() has returned as often as the host wants to know; KT_RETURNED_UNCHANGED: and
+                           the last call has written no memory */
 };
 
 #define KT_BLOCKED_UNIT 256u
+
+#define KT_RETURNED 1u
+#define KT_RETURNED_UNCHANGED 2u
 
 /* The running callback. */
 #define KT_IN_TX_SUCCESS 1u
@@ -180,8 +186,7 @@ struct KtImage {
 KT_ASSERT(sizeof(struct KtRobot) == 80 && __builtin_offsetof(struct KtRobot, debt_cycles) == 40, "no padding");
 KT_ASSERT(sizeof(struct KtMessage) == 12, "no padding");
 KT_ASSERT(sizeof(struct KtReception) == 16, "no padding");
-KT_ASSERT(sizeof(struct KtThread) == 48 && __builtin_offsetof(struct KtThread, budget) == KT_THREAD_BUDGET &&
-              __builtin_offsetof(struct KtThread, held) == KT_THREAD_HELD,
+KT_ASSERT(sizeof(struct KtThread) == 48 && __builtin_offsetof(struct KtThread, held) == KT_THREAD_HELD,
           "no padding");
 KT_ASSERT(sizeof(struct KtSurroundings) == 1136, "no padding");
 KT_ASSERT(sizeof(struct KtImage) == 112, "no padding");

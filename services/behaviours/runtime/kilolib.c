@@ -499,9 +499,12 @@ void kilo_start(void (*setup)(void), void (*loop)(void)) {
         if (robot.loop_rate == KT_LOOP_AS_ON_ROBOT) {
           charge(LOOP_CYCLES);
           loop();
+          /* Written since the host has looked at the state, with all that led to this call. */
+          const uint8_t written = has_written();
           if (--robot.calls == 0) {
-            robot.returned = 1;
+            robot.returned = (uint8_t)(KT_RETURNED_UNCHANGED - written);
             return_to_host();
+            watch_writes();
           }
           break;
         }

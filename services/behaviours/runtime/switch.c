@@ -13,12 +13,14 @@ __attribute__((section(".data.rel.ro.kilotwin"), used)) struct KtExchange* kt_ex
 #define HOST_STACK "%gs:0"
 #define ROBOT_STACK "%gs:8"
 #define INTERRUPT_STACK "%gs:16"
+#define BUDGET "%gs:24"
 #define CHECK "%gs:28"
 #define IN_INTERRUPT "%gs:29"
 #define OVERRUN "%gs:30"
 #define PLACE "%gs:32"
 _Static_assert(__builtin_offsetof(struct KtThread, robot_stack) == 8 &&
                    __builtin_offsetof(struct KtThread, interrupt_stack) == 16 &&
+                   __builtin_offsetof(struct KtThread, budget) == 24 &&
                    __builtin_offsetof(struct KtThread, check) == 28 &&
                    __builtin_offsetof(struct KtThread, in_interrupt) == 29 &&
                    __builtin_offsetof(struct KtThread, overrun) == 30 &&
@@ -38,7 +40,8 @@ _Static_assert(__builtin_offsetof(struct KtThread, robot_stack) == 8 &&
   "xorps %xmm14, %xmm14\n xorps %xmm15, %xmm15\n"
 /* Processors predict returns by the calls that they have seen, so calls and returns must pair up between the host's call of
  * kt_enter and its return. A robot is therefore continued by a jump, and waits by a jump after it has pushed its return address.
- * Only the return to the host is a `ret`, which matches the host's call. Counters jump to kt_preempt in the same way. */
+ * Only the return to the host is a `ret`, which matches the host's call. Counters jump to kt_preempt in the same way. While the
+ * robot runs, xmm15 holds the budget: budget.h. */
 #define CONTINUE "pop %rcx\n jmp *%rcx\n"
 #define FUNCTION(name) ".globl " #name "\n .hidden " #name "\n .type " #name ", @function\n" #name ":\n"
 #define END(name) ".size " #name ", .-" #name "\n"
@@ -48,9 +51,12 @@ __asm__(
     /* uint64_t kt_enter(void) */
     FUNCTION(kt_enter) SAVE
     "mov %rsp, " HOST_STACK "\n"
-    "mov " ROBOT_STACK ", %rsp\n" CLEAR CLEAR_VECTORS RESTORE "xor %eax, %eax\n" CONTINUE END(kt_enter)
+    "mov " ROBOT_STACK ", %rsp\n" CLEAR CLEAR_VECTORS RESTORE
+    "movd " BUDGET ", %xmm15\n"
+    "xor %eax, %eax\n" CONTINUE END(kt_enter)
     /* Target of the jump by which a robot waits (kilolib.c). The robot continues after its jump in the next tick. */
     FUNCTION(kt_wait)
+    "movd %xmm15, " BUDGET "\n"
     "xor %eax, %eax\n"
     "kt_switch:\n" SAVE
     "mov %rsp, " ROBOT_STACK "\n"
@@ -63,8 +69,10 @@ __asm__(
     "mov %rdi, %rax\n"
     "xor %ebx, %ebx\n xor %ebp, %ebp\n xor %ecx, %ecx\n xor %r12d, %r12d\n xor %r13d, %r13d\n xor %r14d, %r14d\n"
     "xor %r15d, %r15d\n" CLEAR CLEAR_VECTORS
+    "movd " BUDGET ", %xmm15\n"
     "call *%rax\n" END(kt_call)
     FUNCTION(kt_leave)
+    "movd %xmm15, " BUDGET "\n"
     "movb $0, " IN_INTERRUPT "\n"
     "mov " HOST_STACK ", %rsp\n" RESTORE "ret\n" END(kt_leave)
 /* void kt_preempt_N(void): called when a test finds the budget used up; N is its KT_CHECK_*. Preserves all registers except
@@ -91,13 +99,19 @@ __asm__(
   "lea 8(%rsp), %rsp\n jmp *-8(%rsp)\n"
     FUNCTION(kt_preempt)
     "cmpb $0, " IN_INTERRUPT "\n jne kt_overrun\n" SAVE_OTHERS
+    "movd %xmm15, " BUDGET "\n"
     "sub $128, %rsp\n" SAVE_ARGUMENTS
     SWITCH RESTORE_ARGUMENTS
     "add $128, %rsp\n" RESTORE_OTHERS END(kt_preempt)
     FUNCTION(kt_preempt_with_vectors)
     "cmpb $0, " IN_INTERRUPT "\n jne kt_overrun\n" SAVE_OTHERS
+    "movd %xmm15, " BUDGET "\n"
+    /* The budget is no state of the robot. */
+    "pxor %xmm15, %xmm15\n"
     "sub $512, %rsp\n and $-64, %rsp\n fxsave64 (%rsp)\n"
     SWITCH
-    "fxrstor64 (%rsp)\n lea -72(%rbp), %rsp\n" RESTORE_OTHERS END(kt_preempt_with_vectors)
+    "fxrstor64 (%rsp)\n"
+    "movd " BUDGET ", %xmm15\n"
+    "lea -72(%rbp), %rsp\n" RESTORE_OTHERS END(kt_preempt_with_vectors)
     FUNCTION(kt_overrun)
     "pop %rax\n mov %rax, " PLACE "\n movb $1, " OVERRUN "\n jmp kt_leave\n" END(kt_overrun));

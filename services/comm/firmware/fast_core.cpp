@@ -7,112 +7,26 @@
 #include <utility>
 
 namespace kilotwin::firmware {
+
+using enum Operation::Kind;
+using namespace data_space;  // NOLINT(google-build-using-namespace)
+
 namespace {
-
-/// Kinds of operations. `Z`: Y and Z with a displacement. A kind names the instruction of the AVR instruction set manual.
-enum Kind : std::uint8_t {
-  kUnknown,
-  kLibsimavrs,
-  kNop,
-  kMovw,
-  kMul,
-  kMuls,
-  kCpc,
-  kSbc,
-  kAdd,
-  kCpse,
-  kCp,
-  kSub,
-  kAdc,
-  kAnd,
-  kEor,
-  kOr,
-  kMov,
-  kCpi,
-  kSbci,
-  kSubi,
-  kOri,
-  kAndi,
-  kLdd,
-  kStd,
-  kLdIncrement,
-  kLdDecrement,
-  kStIncrement,
-  kStDecrement,
-  kLds,
-  kSts,
-  kPush,
-  kPop,
-  kCom,
-  kNeg,
-  kSwap,
-  kInc,
-  kAsr,
-  kLsr,
-  kRor,
-  kDec,
-  kJmp,
-  kCall,
-  kRjmp,
-  kRcall,
-  kRet,
-  kIjmp,
-  kIcall,
-  kAdiw,
-  kSbiw,
-  kLdi,
-  kBrbs,
-  kBrbc,
-  kSbrc,
-  kSbrs,
-  kBst,
-  kBld,
-  kSetFlag,
-  kClearFlag,
-  kLpm,
-  kLpmIncrement,
-  kReadRegister,
-  kWriteDirections,
-  kReadFlags,
-  kWriteFlags,
-  kEnableInterrupts,
-  kWriteStackPointer,
-  kReadConverter,
-  kWriteConverter,
-  kDelayBySbiw,
-  kPoll
-};
-
-/// DDRB, DDRC and DDRD; the PORT register follows each.
-constexpr std::uint32_t kDdrB = 0x24, kDdrC = 0x27, kDdrD = 0x2a;
-constexpr std::uint32_t kX = 26, kY = 28, kZ = 30, kSpl = 0x5d, kSph = 0x5e, kSreg = 0x5f;
-/// The converter's control register, which programs poll. libsimavr computes the comparator's output anew at each read of it, with
-/// the same result.
-constexpr std::uint32_t kAdcsra = 0x7a;
-constexpr std::uint32_t kRegisters = 0x20, kRam = 0x100, kRamEnd = 0x8ff;
 
 /// A longer loop is executed: little would be left of the time between two interrupts.
 constexpr std::uint64_t kLongestLoop = 32768;
 /// A state that did not come back after this number of backward jumps is replaced as soon as at the beginning.
 constexpr std::uint32_t kMostPatience = 4096;
 
-bool is_direction(std::uint32_t address) { return address == kDdrB || address == kDdrC || address == kDdrD; }
-
-bool is_long(std::uint32_t opcode) {
-  return (opcode & 0xfc0f) == 0x9000 || (opcode & 0xfe0c) == 0x940c;  // LDS and STS; JMP and CALL
-}
-
 }  // namespace
 
 FastCore::FastCore(const avr_t& avr, const Converter* converter)
-    : flash_(avr.flash), converter_(converter), operations_(std::make_unique<Operations>()) {
+    : decoder_(avr, converter), converter_(converter), operations_(std::make_unique<Operations>()) {
   operations_->back().kind = kLibsimavrs;
   for (std::uint32_t address = kRegisters; address < kRam; ++address) {
-    const auto& one = avr.io[address - kRegisters];
-    const bool plain = one.r.c == nullptr && (one.irq == nullptr || address == kAdcsra) && address != kSreg;
     const bool is_own = address == kSpl || address == kSph;
-    plain_[address] = plain;
-    if ((plain && !is_own) || is_direction(address) || is_direction(address - 1)) inputs_[address] = 0xff;
+    const bool is_input = decoder_.is_plain(address) && !is_own;
+    if (is_input || is_direction(address) || is_direction(address - 1)) inputs_[address] = 0xff;
   }
 }
 
@@ -131,182 +45,6 @@ void FastCore::forget(std::uint32_t address, std::uint32_t octets) {
   for (std::uint32_t i = first; i < last; ++i) (*operations_)[i] = Operation();
 }
 
-// NOLINTNEXTLINE(readability-function-size): one switch over the instruction set
-FastCore::Operation FastCore::decode(std::uint32_t pc) const {
-  const std::uint32_t o = word(pc), next = pc + 2;
-  const auto d5 = static_cast<std::uint8_t>(o >> 4 & 31), r5 = static_cast<std::uint8_t>((o >> 5 & 16) | (o & 15));
-  const auto d4 = static_cast<std::uint8_t>(16 + (o >> 4 & 15));
-  const std::uint32_t k8 = (o >> 4 & 0xf0) | (o & 15);
-  const Operation other{kLibsimavrs, 0, 0, 1, 0};
-  const auto registers = [&](Kind kind) { return Operation{kind, d5, r5, 1, 0}; };
-  const auto constant = [&](Kind kind) { return Operation{kind, d4, 0, 1, k8}; };
-  // Towards an address beyond the flash libsimavr goes.
-  const auto jump = [&](Kind kind, std::int32_t words, std::uint8_t flag) {
-    const std::int64_t to = std::int64_t{next} + 2 * words;
-    if (to < 0 || to >= std::int64_t{kFlashOctets}) return other;
-    return Operation{kind, flag, 0, 1, static_cast<std::uint32_t>(to)};
-  };
-  const auto skip = [&](Kind kind, std::uint8_t d, std::uint8_t r) {
-    if (next + 4 >= kFlashOctets) return other;
-    return Operation{kind, d, r, static_cast<std::uint8_t>(is_long(word(next)) ? 2 : 1), 0};
-  };
-  switch (o >> 12) {
-    case 0x0:
-      if (o == 0) return {kNop, 0, 0, 1, 0};
-      if ((o & 0xff00) == 0x0100)
-        return {kMovw, static_cast<std::uint8_t>((o >> 4 & 15) * 2), static_cast<std::uint8_t>((o & 15) * 2), 1, 0};
-      if ((o & 0xff00) == 0x0200) return {kMuls, d4, static_cast<std::uint8_t>(16 + (o & 15)), 1, 0};
-      switch (o >> 10) {
-        case 1: return registers(kCpc);
-        case 2: return registers(kSbc);
-        case 3: return registers(kAdd);
-        default: return other;
-      }
-    case 0x1:
-      switch (o >> 10 & 3) {
-        case 0: return skip(kCpse, d5, r5);
-        case 1: return registers(kCp);
-        case 2: return registers(kSub);
-        default: return registers(kAdc);
-      }
-    case 0x2:
-      switch (o >> 10 & 3) {
-        case 0: return registers(kAnd);
-        case 1: return registers(kEor);
-        case 2: return registers(kOr);
-        default: return registers(kMov);
-      }
-    case 0x3: return constant(kCpi);
-    case 0x4: return constant(kSbci);
-    case 0x5: return constant(kSubi);
-    case 0x6: return constant(kOri);
-    case 0x7: return constant(kAndi);
-    case 0x8:
-    case 0xa: {
-      const std::uint32_t q = (o >> 8 & 0x20) | (o >> 7 & 0x18) | (o & 7);
-      const auto base = static_cast<std::uint8_t>((o & 8) != 0 ? kY : kZ);
-      return {(o & 0x0200) != 0 ? kStd : kLdd, d5, base, 1, q};
-    }
-    case 0x9: break;
-    case 0xb: {
-      const std::uint32_t address = (o >> 5 & 0x30) + (o & 15) + 32;
-      const bool directions = is_direction(address);
-      if ((o & 0x0800) != 0) {
-        if (directions) return {kWriteDirections, d5, 0, 1, address};
-        if (address == kSreg) return {kWriteFlags, d5, 0, 1, 0};
-        const bool is_stack_pointer = (address == kSpl || address == kSph) && plain_[address];
-        return is_stack_pointer ? Operation{kWriteStackPointer, d5, 0, 1, address} : other;
-      }
-      if (directions || plain_[address]) return {kReadRegister, d5, 0, 1, address};
-      return address == kSreg ? Operation{kReadFlags, d5, 0, 1, 0} : other;
-    }
-    case 0xc:
-    case 0xd: {
-      const auto words = static_cast<std::int32_t>((o & 0xfff) ^ 0x800) - 0x800;
-      return jump((o & 0x1000) != 0 ? kRcall : kRjmp, words, 0);
-    }
-    case 0xe: return constant(kLdi);
-    default: {
-      const auto flag = static_cast<std::uint8_t>(o & 7);
-      if ((o & 0x0800) == 0) {
-        const auto words = static_cast<std::int32_t>((o >> 3 & 0x7f) ^ 0x40) - 0x40;
-        return jump((o & 0x0400) != 0 ? kBrbc : kBrbs, words, flag);
-      }
-      if ((o & 8) != 0) return other;
-      switch (o >> 9 & 3) {
-        case 0: return {kBld, d5, flag, 1, 0};
-        case 1: return {kBst, d5, flag, 1, 0};
-        case 2: return skip(kSbrc, d5, flag);
-        default: return skip(kSbrs, d5, flag);
-      }
-    }
-  }
-  if ((o & 0x0c00) == 0x0c00) return {kMul, d5, r5, 1, 0};
-  if ((o & 0x0e00) == 0x0600) {
-    const auto pair = static_cast<std::uint8_t>(24 + (o >> 3 & 6));
-    const std::uint32_t k = (o >> 2 & 0x30) | (o & 15);
-    if ((o & 0x0100) == 0) return {kAdiw, pair, 0, 1, k};
-    // A delay: SBIW by 1, and BRNE back to it.
-    const bool loops = k == 1 && next + 2 < kFlashOctets && word(next) == 0xf7f1;
-    return {loops ? kDelayBySbiw : kSbiw, pair, 0, 1, k};
-  }
-  if ((o & 0x0800) != 0) return other;
-  const auto address = [&] { return next + 2 <= kFlashOctets ? word(next) : 0; };
-  const auto in_ram = [](std::uint32_t a) { return a >= kRam && a <= kRamEnd; };
-  const auto readable = [&](std::uint32_t a) { return in_ram(a) || (a < kRam && plain_[a]); };
-  if ((o & 0x0e00) == 0x0000) {
-    switch (o & 15) {
-      case 0x0: {
-        if (converter_ != nullptr && Converter::is_result(address())) return {kReadConverter, d5, 0, 2, address()};
-        if (!readable(address())) return other;
-        // A poll: LDS, SBRC or SBRS of a bit of it, and RJMP back. In its `r`: the bit, and its value that goes on polling << 3.
-        const std::uint32_t skips = next + 6 < kFlashOctets ? word(next + 2) : 0;
-        const bool polls = (skips & 0xfdf8) == (0xfc00u | std::uint32_t{d5} << 4) && word(next + 4) == 0xcffc;
-        if (!polls) return {kLds, d5, 0, 2, address()};
-        return {kPoll, d5, static_cast<std::uint8_t>((skips & 7) | ((skips & 0x0200) != 0 ? 0 : 8)), 2, address()};
-      }
-      case 0x1: return {kLdIncrement, d5, kZ, 1, 0};
-      case 0x2: return {kLdDecrement, d5, kZ, 1, 0};
-      case 0x4: return {kLpm, d5, 0, 1, 0};
-      case 0x5: return {kLpmIncrement, d5, 0, 1, 0};
-      case 0x9: return {kLdIncrement, d5, kY, 1, 0};
-      case 0xa: return {kLdDecrement, d5, kY, 1, 0};
-      case 0xc: return {kLdd, d5, kX, 1, 0};
-      case 0xd: return {kLdIncrement, d5, kX, 1, 0};
-      case 0xe: return {kLdDecrement, d5, kX, 1, 0};
-      case 0xf: return {kPop, d5, 0, 1, 0};
-      default: return other;
-    }
-  }
-  if ((o & 0x0e00) == 0x0200) {
-    switch (o & 15) {
-      case 0x0:
-        if (converter_ != nullptr && Converter::is_control(address()))
-          return {kWriteConverter, d5, 0, 2, address()};
-        return in_ram(address()) ? Operation{kSts, d5, 0, 2, address()} : other;
-      case 0x1: return {kStIncrement, d5, kZ, 1, 0};
-      case 0x2: return {kStDecrement, d5, kZ, 1, 0};
-      case 0x9: return {kStIncrement, d5, kY, 1, 0};
-      case 0xa: return {kStDecrement, d5, kY, 1, 0};
-      case 0xc: return {kStd, d5, kX, 1, 0};
-      case 0xd: return {kStIncrement, d5, kX, 1, 0};
-      case 0xe: return {kStDecrement, d5, kX, 1, 0};
-      case 0xf: return {kPush, d5, 0, 1, 0};
-      default: return other;
-    }
-  }
-  switch (o & 15) {
-    case 0x0: return {kCom, d5, 0, 1, 0};
-    case 0x1: return {kNeg, d5, 0, 1, 0};
-    case 0x2: return {kSwap, d5, 0, 1, 0};
-    case 0x3: return {kInc, d5, 0, 1, 0};
-    case 0x5: return {kAsr, d5, 0, 1, 0};
-    case 0x6: return {kLsr, d5, 0, 1, 0};
-    case 0x7: return {kRor, d5, 0, 1, 0};
-    case 0xa: return {kDec, d5, 0, 1, 0};
-    default: break;
-  }
-  if ((o & 0xfe0c) == 0x940c) {
-    const std::uint32_t to = address() * 2;
-    if ((o & 0x01f1) != 0 || to >= kFlashOctets || next + 2 > kFlashOctets) return other;
-    return {(o & 2) != 0 ? kCall : kJmp, 0, 0, 2, to};
-  }
-  if ((o & 0xff0f) == 0x9408) {
-    const auto flag = static_cast<std::uint8_t>(o >> 4 & 7);
-    // While this core runs no interrupt waits, so to it CLI is a flag like others.
-    if (flag == S_I && (o & 0x80) == 0) return {kEnableInterrupts, 0, 0, 1, 0};
-    return {(o & 0x80) != 0 ? kClearFlag : kSetFlag, flag, 0, 1, 0};
-  }
-  switch (o) {
-    case 0x9409: return {kIjmp, 0, 0, 1, 0};
-    case 0x9508: return {kRet, 0, 0, 1, 0};
-    case 0x9509: return {kIcall, 0, 0, 1, 0};
-    case 0x95c8: return {kLpm, 0, 0, 1, 0};
-    default: return other;
-  }
-}
-
-// NOLINTNEXTLINE(readability-function-size): one switch over the instruction set
 FastCore::Run FastCore::run(avr_t& avr, std::uint64_t cycles) {
   if (waiting_.loop) {
     if (inputs_are(avr, waiting_.loop->begin)) return {skip(avr, cycles), cycles};
@@ -420,6 +158,7 @@ constexpr Flags overflow(std::uint32_t bit) { return (kOverflow | kSign) * bit; 
 }  // namespace
 
 /// As run(), without skipping. With kSeeksLoops it ends where it finds a loop.
+// NOLINTNEXTLINE(readability-function-size): one switch over the instruction set
 template <bool kSeeksLoops> FastCore::Run FastCore::execute(avr_t& avr, std::uint64_t cycles) {
   std::uint8_t* const data = avr.data;
   Operation* const operations = operations_->data();
@@ -489,7 +228,7 @@ template <bool kSeeksLoops> FastCore::Run FastCore::execute(avr_t& avr, std::uin
     std::uint32_t next = pc + 2;
     std::uint32_t took = 1;
     switch (o.kind) {
-      case kUnknown: o = decode(pc); continue;
+      case kUnknown: o = decoder_.decode(pc); continue;
       case kLibsimavrs: goto libsimavrs;
       case kNop: break;
       case kMovw:

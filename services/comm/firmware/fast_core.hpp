@@ -1,4 +1,4 @@
-/// Instructions of the AVR core, decoded once and executed on libsimavr's own state: those that touch registers, RAM, I/O registers
+/// Instructions of the AVR core, decoded once (decoder.hpp) and executed on libsimavr's own state: those that touch registers, RAM, I/O registers
 /// without effects, the flag of interrupts, or the analogue converter. All others are left to libsimavr. The state after any number
 /// of instructions is the same in every bit as with libsimavr; tests/services/comm/firmware/fast_core_test.cpp compares both.
 ///
@@ -8,12 +8,12 @@
 #pragma once
 
 #include <array>
-#include <bitset>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "services/comm/firmware/converter.hpp"
+#include "services/comm/firmware/decoder.hpp"
 #include "services/comm/firmware/flash_image.hpp"
 
 struct avr_t;
@@ -45,10 +45,6 @@ class FastCore {
   void rewind();
 
  private:
-  struct Operation {
-    std::uint8_t kind = 0, d = 0, r = 0, words = 1;
-    std::uint32_t k = 0;  ///< a constant, an address in RAM, or an address in flash in octets
-  };
   /// Registers, I/O registers, RAM and flags.
   struct Memory {
     std::array<std::uint8_t, 0x900> data;
@@ -84,14 +80,9 @@ class FastCore {
   void enter_loop(avr_t&, std::uint32_t period);
   std::uint64_t skip(avr_t&, std::uint64_t cycles);
   void forget_anchor() { anchor_.pc = kNowhere, anchor_.jumps = 0, anchor_.patience = kFirstPatience; }
-  [[nodiscard]] Operation decode(std::uint32_t pc) const;
-  [[nodiscard]] std::uint32_t word(std::uint32_t pc) const {
-    return flash_[pc] | std::uint32_t{flash_[pc + 1]} << 8;
-  }
 
-  const std::uint8_t* flash_;
+  const Decoder decoder_;
   const Converter* converter_;
-  std::bitset<0x100> plain_;  ///< I/O registers that are read without effect, at their addresses in data space
   std::array<std::uint8_t, 0x100> inputs_{};  ///< 0xff for I/O registers that operations read but never change
   /// Per word of the flash. The last stands behind its end.
   using Operations = std::array<Operation, kFlashOctets / 2 + 1>;
