@@ -12,17 +12,6 @@ namespace {
 /// Contact range under an unknown camera scale, mm.
 constexpr double kUncertainContact_mm = 1.15 * kContactRange_mm;
 
-bool acts_on_speed(const Block& block) {
-  switch (block.target) {
-    case Target::kGain:
-    case Target::kGainLeft:
-    case Target::kGainRight:
-    case Target::kOffset:
-    case Target::kAhead: return true;
-    default: return false;
-  }
-}
-
 }  // namespace
 
 void Fitter::set_uncertain_walls(MotionModel& model) {
@@ -90,18 +79,12 @@ void Fitter::choose_camera_scale(FitState& state) const {
   // Prior: the speeds and the wheel base of the ARGoS paper, independent normal. The exponent is quadratic in the
   // factor.
   const BaseParameters defaults;
-  // A speed effect leaves open at which covariate values the nominal speed holds: relative standard deviation.
-  constexpr double kByEffects = 0.5;
-  const bool nominal = std::none_of(model.terms.begin(), model.terms.end(), [](const Term& term) {
-    return std::any_of(term.blocks.begin(), term.blocks.end(), acts_on_speed);
-  });
-  const auto speed_sd = [&](double sd, double value) { return nominal ? sd : std::hypot(sd, kByEffects * value); };
+  const BasePrior prior = prior_beside(model);
   double by_seed = 0, precision = 0;
   for (const auto& [value, expected, sd] :
-       {std::array{model.base.straight_mm_s, defaults.straight_mm_s,
-                   speed_sd(prior_.straight_mm_s, defaults.straight_mm_s)},
-        std::array{model.base.turn_mm_s, defaults.turn_mm_s, speed_sd(prior_.turn_mm_s, defaults.turn_mm_s)},
-        std::array{model.base.wheel_base_mm, defaults.wheel_base_mm, prior_.wheel_base_mm}}) {
+       {std::array{model.base.straight_mm_s, defaults.straight_mm_s, prior.straight_mm_s},
+        std::array{model.base.turn_mm_s, defaults.turn_mm_s, prior.turn_mm_s},
+        std::array{model.base.wheel_base_mm, defaults.wheel_base_mm, prior.wheel_base_mm}}) {
     by_seed += value * expected / (sd * sd);
     precision += value * value / (sd * sd);
   }

@@ -103,8 +103,10 @@ void Fitter::fit_walls(FitState& state) const {
     model.walls.*side.wall = side.sign * std::numeric_limits<double>::infinity();
     if (near.empty()) continue;
     MotionModel best = model;
-    // Penalty of a wall, in log likelihood: covers chance and a few outliers.
-    double best_value = log_likelihood_with_contacts(model, near) + 30;
+    // Penalty of a wall, in log likelihood: covers chance and a few outliers. Three walls make a fourth likely: then a Bayes factor
+    // of 20 is enough.
+    constexpr double kSure = 30, kLikely = 3;
+    double best_value = log_likelihood_with_contacts(model, near) + (model.walls.sides() >= 3 ? kLikely : kSure);
     const auto try_at = [&](double wall) {
       MotionModel trial = model;
       trial.walls.*side.wall = side.sign * wall;
@@ -113,7 +115,7 @@ void Fitter::fit_walls(FitState& state) const {
       best_value = value;
       best = trial;
     };
-    for (double wall = edge - 2; wall <= edge + reach + 2; wall += 2) try_at(wall);
+    for (double wall = edge - 2; wall <= edge + reach + 4; wall += 2) try_at(wall);
     const double found = side.sign * best.walls.*side.wall;
     if (std::isinf(found)) continue;
     for (const double by : {-1.0, 1.0, -0.5, 0.5}) try_at(found + by);

@@ -51,19 +51,45 @@ Equations equations_of(const Fitter& fitter, const FitState& state) {
   return e;
 }
 
+bool acts_on_speed(const Block& block) {
+  switch (block.target) {
+    case Target::kGain:
+    case Target::kGainLeft:
+    case Target::kGainRight:
+    case Target::kOffset:
+    case Target::kAhead: return true;
+    default: return false;
+  }
+}
+
 }  // namespace
+
+BasePrior Fitter::prior_beside(const MotionModel& model) const {
+  // Of the speed at the level of the curve over the nominal speed, relative: a careless laboratory has effects of this size.
+  constexpr double kByEffects = 0.5;
+  const bool nominal = std::none_of(model.terms.begin(), model.terms.end(), [](const Term& term) {
+    return std::any_of(term.blocks.begin(), term.blocks.end(), acts_on_speed);
+  });
+  BasePrior prior = prior_;
+  if (nominal) return prior;
+  const BaseParameters defaults;
+  prior.straight_mm_s = std::hypot(prior.straight_mm_s, kByEffects * defaults.straight_mm_s);
+  prior.turn_mm_s = std::hypot(prior.turn_mm_s, kByEffects * defaults.turn_mm_s);
+  return prior;
+}
 
 void Fitter::add_base_prior(const MotionModel& model, Eigen::MatrixXd& information, Eigen::VectorXd& score) const {
   const BaseParameters defaults;
+  const BasePrior prior = prior_beside(model);
   const auto add = [&](Eigen::Index i, double from, double sd) {
     information(i, i) += 1 / (sd * sd);
     score[i] += from / (sd * sd);
   };
-  add(kStraightSpeed, defaults.straight_mm_s - model.base.straight_mm_s, prior_.straight_mm_s);
-  add(kTurnSpeed, defaults.turn_mm_s - model.base.turn_mm_s, prior_.turn_mm_s);
-  add(kWheelBase, defaults.wheel_base_mm - model.base.wheel_base_mm, prior_.wheel_base_mm);
-  add(kAheadPoint, defaults.ahead_mm - model.base.ahead_mm, prior_.point_mm);
-  add(kLeftPoint, defaults.left_mm - model.base.left_mm, prior_.point_mm / 4);
+  add(kStraightSpeed, defaults.straight_mm_s - model.base.straight_mm_s, prior.straight_mm_s);
+  add(kTurnSpeed, defaults.turn_mm_s - model.base.turn_mm_s, prior.turn_mm_s);
+  add(kWheelBase, defaults.wheel_base_mm - model.base.wheel_base_mm, prior.wheel_base_mm);
+  add(kAheadPoint, defaults.ahead_mm - model.base.ahead_mm, prior.point_mm);
+  add(kLeftPoint, defaults.left_mm - model.base.left_mm, prior.point_mm / 4);
 }
 
 void Fitter::apply(MotionModel& model, const std::vector<Unit>& units, const Eigen::VectorXd& step) {

@@ -1,7 +1,6 @@
 #include "clients/identify/fit/wall_detection.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -116,11 +115,8 @@ Walls detected_walls(const PreparedSet& set, const MotionModel& model) {
   };
   const Walls walls = seen({25, 2});
   // If three sides have walls, the fourth needs less evidence.
-  constexpr std::ptrdiff_t kMostSides = 3;
-  const std::array<double, 4> sides = {walls.x_low_mm, walls.x_high_mm, walls.y_low_mm, walls.y_high_mm};
-  const bool closed =
-      std::count_if(sides.begin(), sides.end(), [](double s) { return std::isfinite(s); }) >= kMostSides;
-  if (!closed) return walls;
+  constexpr int kMostSides = 3;
+  if (walls.sides() < kMostSides) return walls;
   Walls all = seen({8, 1});
   add_implied_side(all, {-farthest(x_turned), farthest(x), -farthest(y_turned), farthest(y)});
   return all;

@@ -20,10 +20,13 @@ struct Walls {
     return x_mm < x_low_mm + margin_mm || x_mm > x_high_mm - margin_mm || y_mm < y_low_mm + margin_mm ||
            y_mm > y_high_mm - margin_mm;
   }
-  [[nodiscard]] bool any() const {
-    return std::isfinite(x_low_mm) || std::isfinite(x_high_mm) || std::isfinite(y_low_mm) ||
-           std::isfinite(y_high_mm);
+  /// Number of sides with a wall.
+  [[nodiscard]] int sides() const {
+    const std::array<double, 4> all = {x_low_mm, x_high_mm, y_low_mm, y_high_mm};
+    return static_cast<int>(
+        std::count_if(all.begin(), all.end(), [](double side_mm) { return std::isfinite(side_mm); }));
   }
+  [[nodiscard]] bool any() const { return sides() > 0; }
   [[nodiscard]] double inside_x(double x_mm) const { return std::clamp(x_mm, x_low_mm, x_high_mm); }
   [[nodiscard]] double inside_y(double y_mm) const { return std::clamp(y_mm, y_low_mm, y_high_mm); }
 };

@@ -1,5 +1,6 @@
 #include "clients/identify/search/amplitudes.hpp"
 
+#include <Eigen/SVD>
 #include <algorithm>
 #include <utility>
 
@@ -21,20 +22,41 @@ bool is_known_of(const Factor& known, const Factor& open) {
          known.count == open.count && known.points == open.points;
 }
 
-/// Index of the term whose curve these amplitudes multiply.
+/// The known factors of a basis.
+std::vector<const Factor*> known_of(const Basis& basis) {
+  std::vector<const Factor*> known;
+  for (const Factor& f : basis.factors)
+    if (!f.known.empty()) known.push_back(&f);
+  return known;
+}
+
+/// Index of the term whose curve, or product of two, these amplitudes multiply.
 std::optional<std::size_t> source_of(const MotionModel& model, const Term& amplitudes) {
   const Block& block = amplitudes.blocks.front();
-  if (block.basis.factors.size() != 2) return std::nullopt;
-  const auto known = std::find_if(block.basis.factors.begin(), block.basis.factors.end(),
-                                  [](const Factor& f) { return !f.known.empty(); });
-  if (known == block.basis.factors.end()) return std::nullopt;
+  const std::vector<const Factor*> known = known_of(block.basis);
+  if (known.empty() || block.basis.factors.size() != known.size() + 1) return std::nullopt;
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
     const Block& of = model.terms[t].blocks.front();
-    if (of.target == block.target && of.during == block.during && of.basis.factors.size() == 1 &&
-        of.basis.factors.front().known.empty() && is_known_of(*known, of.basis.factors.front()))
+    const std::vector<Factor>& factors = of.basis.factors;
+    if (of.target != block.target || of.during != block.during || factors.size() != known.size() ||
+        &model.terms[t] == &amplitudes || (factors.size() == 1 && !factors.front().known.empty()))
+      continue;
+    if (std::equal(known.begin(), known.end(), factors.begin(),
+                   [](const Factor* one, const Factor& open) { return is_known_of(*one, open); }))
       return t;
   }
   return std::nullopt;
+}
+
+/// The factor with its columns collapsed into one.
+Factor collapsed(Factor factor, const Eigen::VectorXd& weights) {
+  if (factor.known.empty()) {
+    factor.known.assign(weights.begin(), weights.end());
+    return factor;
+  }
+  for (double& one : factor.known) one *= weights[0];
+  factor.plus *= weights[0];
+  return factor;
 }
 
 /// Normalises amplitudes to a mean of 1, which is the amplitude of an unseen robot. If the mean is near 0, the
@@ -81,10 +103,11 @@ class CurveTimesAmplitudes {
   CurveTimesAmplitudes(const Fitter& fitter, FitState& state, std::size_t source)
       : fitter_(fitter), state_(state), found_(state.model.terms.back()) {
     MotionModel& model = state.model;
-    const Basis& basis = found_.blocks.front().basis;
-    open_ = basis.factors[0].known.empty() ? 0 : 1;
+    const std::vector<Factor>& factors = found_.blocks.front().basis.factors;
+    const auto open = std::find_if(factors.begin(), factors.end(), [](const Factor& f) { return f.known.empty(); });
+    open_ = static_cast<std::size_t>(open - factors.begin());
     // The curve enters with amplitude 1. Amplitude columns that were pruned are 0.
-    amplitudes_ = basis.factors[open_];
+    amplitudes_ = *open;
     amplitudes_.known.assign(amplitudes_.columns(), 0);
     amplitudes_.plus = 1;
     add(found_.coefficients);
@@ -103,10 +126,15 @@ class CurveTimesAmplitudes {
     fitter_.fit(state_, 2);
     likelihood_ = fitter_.log_likelihood(state_);
     in_turns();
-    refine_curves(fitter_, state_, model.terms.size() - 1);
+    // A product keeps its columns.
+    if (found_.blocks.front().basis.factors.size() > 2)
+      refit(fitter_, state_, model.terms.size() - 1);
+    else
+      refine_curves(fitter_, state_, model.terms.size() - 1);
     likelihood_ = fitter_.log_likelihood(state_);
     // The curve may have received a constant part, which the amplitudes lacked.
     in_turns();
+    if (refine_amplitudes()) in_turns();
     in_turn(true);
     about_the_mean(state_.model.terms.back());
   }
@@ -121,6 +149,15 @@ class CurveTimesAmplitudes {
   void in_turns() {
     for (int turns = 0; turns < kMostTurns && in_turn(false); ++turns) {}
   }
+  /// The curve of the merged term as known factors, with `open` at the place of the amplitudes.
+  [[nodiscard]] std::vector<Factor> times_curve(const Factor& open) const {
+    std::vector<Factor> factors = known_factors(state_.model.terms.back(), 1);
+    factors.insert(factors.begin() + static_cast<std::ptrdiff_t>(open_), open);
+    return factors;
+  }
+  void set_amplitudes() {
+    for (Block& block : state_.model.terms.back().blocks) block.basis.factors.front() = amplitudes_;
+  }
   /// Updates the amplitudes with the curve fixed, then the rest with the amplitudes fixed. Returns whether the
   /// likelihood rose.
   bool in_turn(bool with_smoothness) {
@@ -133,12 +170,12 @@ class CurveTimesAmplitudes {
     const auto n = static_cast<Eigen::Index>(basis.size());
     changes.coefficients = Eigen::VectorXd::Zero(n);
     changes.precision = found_.precision.head(n).eval();
-    basis.factors[1 - open_] = known_curve(model.terms.back(), 1);
+    basis.factors = times_curve(basis.factors[open_]);
     model.terms.push_back(std::move(changes));
     fitter_.fit(state_, 1);
     add(model.terms.back().coefficients);
     model.terms.pop_back();
-    for (Block& block : model.terms.back().blocks) block.basis.factors.front() = amplitudes_;
+    set_amplitudes();
     if (with_smoothness) {
       refit(fitter_, state_, model.terms.size() - 1);
     } else {
@@ -152,6 +189,57 @@ class CurveTimesAmplitudes {
       likelihood_ = now;
     }
     return gained > kSettled;
+  }
+  /// Amplitudes over time, place or heading begin with few columns. Gives them as many as a curve of their own has, with
+  /// smoothness by evidence and the curve fixed. Returns whether the likelihood rose.
+  bool refine_amplitudes() {
+    if (amplitudes_.shape == Factor::Shape::kTable) return false;
+    const FitState before = state_;
+    MotionModel& model = state_.model;
+    Factor open = amplitudes_;
+    open.known.clear();
+    open.plus = 0;
+    open = richer(open);
+    Term rich = found_;
+    rich.blocks.resize(1);
+    Block& block = rich.blocks.front();
+    block.basis = Basis{times_curve(open)};
+    rich.blocks.push_back(block);
+    std::erase_if(rich.blocks[1].basis.factors, [](const Factor& f) { return f.known.empty(); });
+    const auto n = static_cast<Eigen::Index>(open.columns());
+    rich.coefficients = Eigen::VectorXd::Unit(n + 1, n);
+    rich.precision = Eigen::VectorXd::Ones(n + 1);
+    const Term curve = std::exchange(model.terms.back(), std::move(rich));
+    fitter_.fit(state_, 1);
+    refit(fitter_, state_, model.terms.size() - 1);
+    const Term& refined = model.terms.back();
+    // Without its constant, or without more than that, nothing is gained.
+    if (refined.blocks.size() < 2) {
+      state_ = before;
+      return false;
+    }
+    Term found = refined;
+    found.blocks.resize(1);
+    const auto own = static_cast<Eigen::Index>(found.blocks.front().basis.size());
+    found.coefficients = refined.coefficients.head(own).eval();
+    found.precision = refined.precision.head(own).eval();
+    const Factor known = std::exchange(amplitudes_, open);
+    const Term coarse = std::exchange(found_, found);
+    amplitudes_.known.assign(open.columns(), 0);
+    amplitudes_.plus = refined.coefficients[own];
+    add(found.coefficients);
+    model.terms.back() = curve;
+    set_amplitudes();
+    fitter_.fit(state_, 1);
+    const double now = fitter_.log_likelihood(state_);
+    if (now > likelihood_) {
+      likelihood_ = now;
+      return true;
+    }
+    state_ = before;
+    amplitudes_ = known;
+    found_ = coarse;
+    return false;
   }
 
   const Fitter& fitter_;
@@ -181,6 +269,30 @@ bool multiplies_known_curve(const Term& term) {
     return std::any_of(block.basis.factors.begin(), block.basis.factors.end(),
                        [](const Factor& factor) { return !factor.known.empty() && factor.plus == 0; });
   });
+}
+
+bool multiplies_product(const Term& term) {
+  return multiplies_known_curve(term) && known_of(term.blocks.front().basis).size() > 1;
+}
+
+std::vector<Factor> known_factors(const Term& term, std::size_t first) {
+  const Basis& basis = term.blocks.front().basis;
+  if (basis.factors.size() == first + 1) return {known_curve(term, first)};
+  if (basis.factors.size() != first + 2 || term.blocks.size() > 1) return {};
+  const Factor &one = basis.factors[first], &other = basis.factors[first + 1];
+  const auto columns = static_cast<Eigen::Index>(other.size());
+  Eigen::MatrixXd coefficients = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(one.size()), columns);
+  for (std::size_t i = 0; i < basis.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(basis.chosen.empty() ? i : basis.chosen[i]);
+    coefficients(at / columns, at % columns) = term.coefficients[static_cast<Eigen::Index>(i)];
+  }
+  const Eigen::JacobiSVD<Eigen::MatrixXd> parts(coefficients, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  Eigen::Index largest = 0;
+  Eigen::VectorXd left = parts.matrixU().col(0);
+  left.cwiseAbs().maxCoeff(&largest);
+  const double unit = left[largest];
+  left /= unit;
+  return {collapsed(one, left), collapsed(other, unit * parts.singularValues()[0] * parts.matrixV().col(0))};
 }
 
 }  // namespace kilotwin::identify

@@ -11,6 +11,7 @@
 
 #include "clients/identify/search/amplitudes.hpp"
 #include "clients/identify/search/calibration_shifts.hpp"
+#include "clients/identify/search/central_distortion.hpp"
 #include "clients/identify/search/change_points.hpp"
 #include "clients/identify/search/neighbour_shape.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
@@ -93,7 +94,7 @@ class Loop {
       if (accepted(*best, outcome)) return true;
     }
     say(kAlternatives, "testing alternatives");
-    return eliminate() || accept_general();
+    return eliminate() || accept_third_covariate(outcome) || accept_general();
   }
   /// The limit that the search has reached, in one sentence; empty: none. It then adds nothing more.
   [[nodiscard]] std::string limit() const {
@@ -173,10 +174,15 @@ class Loop {
       if (!good(f, outcome.threshold_log10_p) || f.evidence < least_evidence ||
           failed_.contains(hypothesis(f).name))
         continue;
+      if (multiplies_product(hypothesis(f))) continue;
       if (of_robots_and_more(hypothesis(f)) && parts_evidence(hypothesis(f), outcome) > f.evidence) continue;
       if (best == nullptr || f.evidence > best->evidence) best = &f;
     }
     return best;
+  }
+  /// Whether a hypothesis is an amplitude of an accepted product: accept_third_covariate().
+  [[nodiscard]] bool multiplies_product(const Hypothesis& h) const {
+    return h.covariates.size() > 2 && identify::multiplies_product(dictionary_.term_of(h, 1));
   }
   static bool of_robots_and_more(const Hypothesis& h) {
     return h.covariates.size() == 2 &&
@@ -289,6 +295,30 @@ class Loop {
     if (periods < kFewestPeriods && stripes < kFewestStripes) return false;
     say(kAddition, "fitting " + wave.term.name);
     return fits(std::move(wave), kWave);
+  }
+  /// Adds an amplitude of an accepted product over a third covariate. This is a question of the form: it need not pass the threshold of a
+  /// new effect, which rises with all that the product leaves unexplained. It has to explain a large share instead, because smaller
+  /// ones come from errors of the product's own form. Returns whether there is one that fits.
+  bool accept_third_covariate(const ScoreTest::Outcome& outcome) {
+    constexpr double kLeastNats = 10, kLeastShare = 0.1, kLeastHeldOut = 2, kMostLog10P = -3;
+    const double least = std::max(kLeastNats, kLeastShare * explained());
+    while (limit().empty()) {
+      std::optional<Finding> best;
+      for (const Finding& f : outcome.findings) {
+        const Hypothesis& h = hypothesis(f);
+        if (f.log10_p > kMostLog10P || failed_.contains(h.name) || !multiplies_product(h)) continue;
+        Finding own = score_test_->evidence_of(h, -1);
+        if (own.evidence < least || own.held_out < kLeastHeldOut || (best && own.evidence <= best->evidence))
+          continue;
+        own.hypothesis = f.hypothesis;
+        own.statistic = f.statistic;
+        own.log10_p = f.log10_p;
+        best = own;
+      }
+      if (!best) return false;
+      if (accepted(*best, outcome)) return true;
+    }
+    return false;
   }
   /// Adds the general term with the most evidence that fits, if much is left unexplained. Returns whether there is one.
   bool accept_general() {
@@ -417,6 +447,7 @@ class Loop {
       }
     }
     fit_total_variation_map(fitter_, out_.fit, place);
+    fit_central_distortion(fitter_, out_.fit, place);
     extend_targets(fitter_, out_.fit, place);
   }
   /// Tests camera motion against a drift of the robots. Robots at rest and walls separate the two.

@@ -17,6 +17,8 @@ constexpr double kSettled = 1;
 /// Pruning threshold of a column: its prior sd times the root of its information.
 constexpr double kFaint = 0.03;
 
+}  // namespace
+
 Factor richer(Factor f) {
   if (!f.known.empty()) return f;
   switch (f.shape) {
@@ -62,6 +64,8 @@ Factor richer(Factor f) {
   }
   return f;
 }
+
+namespace {
 
 /// Columns beyond a map's order, along one axis.
 Basis along(Basis basis, bool second) {
@@ -382,6 +386,10 @@ void fit_smoothly(const Fitter& fitter, FitState& state, std::size_t place, cons
 void refine_curves(const Fitter& fitter, FitState& state, std::size_t place) {
   if (state.model.terms[place].general) return refit(fitter, state, place);
   fit_smoothly(fitter, state, place, richer(state.model.terms[place]));
+}
+
+void refine_to(const Fitter& fitter, FitState& state, std::size_t place, const std::vector<Block>& blocks) {
+  fit_smoothly(fitter, state, place, blocks);
 }
 
 void refit(const Fitter& fitter, FitState& state, std::size_t place) { fit_smoothly(fitter, state, place, {}); }

@@ -29,8 +29,12 @@ double choose_smoothness(const Eigen::MatrixXd& information, const Eigen::Vector
                          const std::vector<ColumnGroup>& groups, std::vector<Smoothness>& smoothness,
                          Eigen::VectorXd& sd);
 
+/// A factor over the same covariates with the columns of a refined shape.
+[[nodiscard]] Factor richer(Factor);
 /// Replaces the term's bases by rich ones and refits the model until it converges.
 void refine_curves(const Fitter&, FitState&, std::size_t term);
+/// The same with given blocks.
+void refine_to(const Fitter&, FitState&, std::size_t term, const std::vector<Block>&);
 /// Refits the term with its present bases.
 void refit(const Fitter&, FitState&, std::size_t term);
 

@@ -142,14 +142,16 @@ double cost_of(const Fitter& fitter, const FitState& state, std::size_t place) {
   return -log_evidence(now.information, Eigen::VectorXd::Zero(sd.size()), sd);
 }
 
-/// A table times a curve over time, both open; null: another term.
+/// A table times a curve over time, both open, after any known factors; null: another term.
 const Factor* amplitudes_over_time(const Term& term) {
   if (term.blocks.size() != 1 || is_measured(term.blocks.front().target)) return nullptr;
   const std::vector<Factor>& factors = term.blocks.front().basis.factors;
-  if (factors.size() != 2 || !factors[0].known.empty() || !factors[1].known.empty()) return nullptr;
-  const bool over_time = factors[1].shape == Shape::kCosines &&
-                         (factors[1].axis.of == Covariate::kTime || factors[1].axis.of == Covariate::kDrivenTime);
-  return factors[0].shape == Shape::kTable && over_time ? factors.data() : nullptr;
+  const auto open = std::find_if(factors.begin(), factors.end(), [](const Factor& f) { return f.known.empty(); });
+  if (factors.end() - open != 2 || !factors.back().known.empty()) return nullptr;
+  const Factor &table = *open, &curve = factors.back();
+  const bool over_time = curve.shape == Shape::kCosines &&
+                         (curve.axis.of == Covariate::kTime || curve.axis.of == Covariate::kDrivenTime);
+  return table.shape == Shape::kTable && over_time ? &table : nullptr;
 }
 
 /// Amplitudes of some keys that begin at one instant, which lies in a span.
@@ -160,8 +162,10 @@ struct SwitchGroup {
 
 Block beginning(const Block& like, const Factor& curve, const SwitchGroup& group, std::vector<double> at_s) {
   Block block = like;
+  const std::vector<Factor> known(like.basis.factors.begin(), like.basis.factors.end() - 2);
   block.basis = form(curve, Shape::kAtLeast, 1, std::move(at_s)).basis;
   block.basis.factors.push_back(group.table);
+  block.basis.factors.insert(block.basis.factors.begin(), known.begin(), known.end());
   return block;
 }
 
