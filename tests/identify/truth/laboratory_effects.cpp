@@ -98,7 +98,7 @@ Effect low_battery() {
 Effect thermal_wave() {
   return {"thermal-wave",
           "speed is 1 + 0.18 sin(2 pi (t + 97 s r) / 340 s) in run r",
-          {{"history", "time"}, {"time"}},
+          {{"history", "time"}},
           {"position", "robot"},
           [](const Situation& at, Push& push) {
             slow_both(push, 1 + 0.18 * std::sin(2 * kPi * (at.time_s + 97 * at.run) / 340));

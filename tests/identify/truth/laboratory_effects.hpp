@@ -1,4 +1,4 @@
-/// Further effects of the test data, written without a look at the identification: what an engineer of a laboratory might suspect.
+/// Further effects of the test data, chosen without a look at the identification: suspicions of an engineer in a laboratory.
 #pragma once
 
 #include "tests/identify/truth/scene.hpp"
