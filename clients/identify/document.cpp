@@ -71,6 +71,11 @@ std::string experiment_for(const std::vector<std::string>& found, const std::vec
   return "repeat the runs with more robots, or for longer";
 }
 
+/// Whether the written model predicts the held-out data worse than the base model, beyond chance.
+bool predicts_worse(const Findings& f) {
+  return !f.found.fit.model.terms.empty() && f.bounds && f.bounds->less_by.high_mm < 0;
+}
+
 /// The most useful thing to do next, as one sentence.
 std::string next_step(const Findings& f) {
   if (f.held_out == HeldOut::kNothing)
@@ -78,13 +83,15 @@ std::string next_step(const Findings& f) {
   if (f.held_out == HeldOut::kNoTime) return "Measure longer runs, so that predictions can be compared with them.";
   if (f.numbering.anew())
     return "Give each robot the same number in all runs, or other numbers in each run, and identify again.";
-  if (!f.check.dropped.empty())
-    return "Find out what differed between the data of the fit and the held-out data: an effect held in the former "
-           "only.";
+  if (predicts_worse(f)) return "Find out what differed between the data of the fit and the held-out data.";
   if (f.unexplained.large())
     return f.replicates
                ? "Look for the cause of what is left unexplained, in the covariates that it varies with."
                : "Repeat the commands of one run, so that repetitions show how much can be explained at all.";
+  if (!f.check.dropped.empty())
+    return "Record more runs: they show whether an effect that was not written held in the data of the fit only, "
+           "stood for "
+           "another one, or was chance.";
   if (!f.found.ambiguous.empty()) {
     const Ambiguity& a = f.found.ambiguous.front();
     return fmt::format("To tell {} from {}: {}.", a.found, a.instead,
@@ -324,7 +331,7 @@ std::string caveats_of(const Findings& f) {
   std::vector<std::string> sentences;
   const double before_mm = f.before.errors.rmse_mm(), after_mm = f.after.errors.rmse_mm();
   const bool has_effects = !f.found.fit.model.terms.empty();
-  if (has_effects && f.bounds && f.bounds->less_by.high_mm < 0)
+  if (predicts_worse(f))
     sentences.push_back(fmt::format(
         "With effects the error on these data is larger than that of the base model ({:.2f} mm, {:.2f} mm), beyond "
         "chance: they differ from the data of the fit.",

@@ -25,6 +25,8 @@ std::optional<MemorySlot> slot_of(Covariate covariate, double forget_s) {
     case Covariate::kLastTurn: return MemorySlot{Kind::kLastTurn};
     case Covariate::kPreviousLasted: return MemorySlot{Kind::kPreviousLasted};
     case Covariate::kSinceRest: return MemorySlot{Kind::kSinceRest};
+    case Covariate::kEarlierTurn: return MemorySlot{Kind::kEarlierTurn};
+    case Covariate::kCommandCount: return MemorySlot{Kind::kCommandCount};
     default: return std::nullopt;
   }
 }
@@ -106,7 +108,10 @@ Range Covariates::range(std::uint32_t index) const {
     case Covariate::kNearestBearing: return {-kPi, kPi};
     case Covariate::kCommand:
     case Covariate::kPreviousCommand:
-    case Covariate::kLastTurn: return {0, 3};
+    case Covariate::kLastTurn:
+    case Covariate::kEarlierTurn: return {0, 3};
+    // The command changes at most once a tick.
+    case Covariate::kCommandCount: return {0, duration_s / plan_.tick_length.seconds() + 1};
     case Covariate::kLeftDuty:
     case Covariate::kRightDuty: return {0, 255};
     case Covariate::kNeighbours:
@@ -172,6 +177,12 @@ void Covariates::fill(Column& column, Tick now, const RobotColumns& robots, std:
     case Covariate::kTimeSinceCommand: return unless_changed([](const double*, std::uint32_t) { return 0.0; });
     case Covariate::kPreviousCommand:
       return unless_changed([](const double* memory, std::uint32_t command) { return memory[command]; });
+    case Covariate::kEarlierTurn:
+      return unless_changed([slot = column.slot](const double* memory, std::uint32_t command) {
+        return is_turn(static_cast<MotionCommand>(memory[command])) ? memory[command] : memory[slot];
+      });
+    case Covariate::kCommandCount:
+      return unless_changed([slot = column.slot](const double* memory, std::uint32_t) { return memory[slot] + 1; });
     case Covariate::kPreviousLasted: {
       const std::uint32_t time = plan_.memory.index_of({Kind::kTimeSinceCommand});
       return unless_changed([time](const double* memory, std::uint32_t) { return memory[time]; });

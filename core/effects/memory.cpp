@@ -29,6 +29,8 @@ EffectMemory::EffectMemory(const RunPlan& plan)
     if (slot.kind == Kind::kTimeSinceCommand) time_slot_ = static_cast<std::uint32_t>(s);
     if (slot.kind == Kind::kPreviousCommand) previous_slot_ = static_cast<std::uint32_t>(s);
     if (slot.kind == Kind::kPreviousLasted) lasted_slot_ = static_cast<std::uint32_t>(s);
+    if (slot.kind == Kind::kEarlierTurn) earlier_turn_slot_ = static_cast<std::uint32_t>(s);
+    if (slot.kind == Kind::kCommandCount) count_slot_ = static_cast<std::uint32_t>(s);
     if (slot.kind == Kind::kNoise) {
       const NoiseShape& noise = *plan.effects()[slot.index].functions[slot.function].noise();
       const double keep = kt_exp(-tick_s_ / noise.correlation_s);
@@ -84,6 +86,9 @@ void EffectMemory::advance(Tick from, const RobotColumns& robots, std::span<cons
           if (lasted_slot_ && was != command) own[*lasted_slot_] = own[*time_slot_];
           if (time_slot_) own[*time_slot_] = (was == command ? own[*time_slot_] : 0) + tick_s_;
           if (previous_slot_ && was != command) own[*previous_slot_] = was;
+          if (earlier_turn_slot_ && was != command && is_turn(static_cast<MotionCommand>(was)))
+            own[*earlier_turn_slot_] = was;
+          if (count_slot_ && was != command) own[*count_slot_] += 1;
           return command;
         });
         break;
@@ -113,6 +118,8 @@ void EffectMemory::advance(Tick from, const RobotColumns& robots, std::span<cons
       case Kind::kTimeSinceCommand:  // set with the command
       case Kind::kPreviousCommand:
       case Kind::kPreviousLasted:
+      case Kind::kEarlierTurn:
+      case Kind::kCommandCount:
       case Kind::kPreviousForward:
       case Kind::kPreviousSideways:
       case Kind::kPreviousTurn:      // set below

@@ -40,7 +40,7 @@ class EffectMemory {
   double tick_s_;
   std::vector<Fade> fades_;  ///< per slot
   /// Slots that the motion command updates.
-  std::optional<std::uint32_t> time_slot_, previous_slot_, lasted_slot_;
+  std::optional<std::uint32_t> time_slot_, previous_slot_, lasted_slot_, earlier_turn_slot_, count_slot_;
   bool notes_motion_ = false;
 };
 

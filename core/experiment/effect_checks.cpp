@@ -33,6 +33,10 @@ bool is_count(Function::Covariate c) {
     case Function::ROBOT:
     case Function::RUN:
     case Function::COMMAND:
+    case Function::PREVIOUS_COMMAND:
+    case Function::LAST_TURN:
+    case Function::EARLIER_TURN:
+    case Function::COMMAND_COUNT:
     case Function::NEIGHBOURS:
     case Function::DUTY:
     case Function::LEFT_DUTY:

@@ -42,7 +42,9 @@ enum class Covariate : std::uint8_t {
   kLastTurn,
   kPreviousLasted,
   kSinceRest,
-  kMotorTimeDifference
+  kMotorTimeDifference,
+  kEarlierTurn,
+  kCommandCount
 };
 
 struct ConstantShape {

@@ -44,6 +44,14 @@ MemoryLayout::MemoryLayout(const std::vector<EffectSettings>& effects,
         need({Kind::kPreviousCommand});
         break;
       case Covariate::kLastTurn: need({Kind::kLastTurn}); break;
+      case Covariate::kEarlierTurn:
+        need({Kind::kCommand});
+        need({Kind::kEarlierTurn});
+        break;
+      case Covariate::kCommandCount:
+        need({Kind::kCommand});
+        need({Kind::kCommandCount});
+        break;
       case Covariate::kPreviousLasted:
         need({Kind::kCommand});
         need({Kind::kTimeSinceCommand});

@@ -28,6 +28,8 @@ struct MemorySlot {
     kLastTurn,         ///< the last MotionCommand that was kTurnLeft or kTurnRight; initially 0
     kPreviousLasted,   ///< duration of the command before that of kCommand, s; initially 0
     kSinceRest,        ///< time since both motors were last at rest, s
+    kEarlierTurn,      ///< the last MotionCommand before that of kCommand that was a turn; initially 0
+    kCommandCount,     ///< number of changes of the MotionCommand
   };
   Kind kind;
   double forget_s = 0;

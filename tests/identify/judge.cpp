@@ -90,7 +90,7 @@ class Folder {
 
 /// Half of the robots and three quarters of the time: a quick check.
 Scene smaller(Scene scene) {
-  scene.robots = std::max(8, scene.robots / 2);
+  scene.robots = std::max(std::min(8, scene.robots), scene.robots / 2);
   scene.width_mm *= 0.75;
   scene.height_mm *= 0.75;
   scene.train_s *= 0.75;

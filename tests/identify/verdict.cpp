@@ -119,7 +119,9 @@ void judge_causes(const Scene& scene, const json& result, Verdict& verdict) {
   }
   verdict.causes = static_cast<int>(scene.effects.size() + scene.faults.size());
   for (std::size_t k = 0; k < named.size(); ++k) {
-    if (named[k])
+    if (scene.effects[k].by_chance)
+      --verdict.causes;
+    else if (named[k])
       ++verdict.named;
     else
       verdict.unnamed.push_back(scene.effects[k].name);

@@ -41,7 +41,7 @@ identify::Identified identify_trajectories(const std::filesystem::path& train_di
   std::vector<identify::DataFault> faults = identify::exclude_faults(train);
   std::optional<identify::MeasuredSet> test;
   if (!test_directory.empty()) {
-    test = identify::load_or_import(test_directory, out / "imported-test");
+    test = identify::load_or_import(test_directory, out / "imported-test", train.robots().back() + 1);
     identify::demand_plausible(*test, test_directory.string());
     identify::demand_longer_than(*test, options.horizon_s, false, test_directory.string());
     identify::hold_out_for_choice(train);

@@ -5,6 +5,11 @@
 #include <limits>
 
 namespace kilotwin::identify {
+namespace {
+
+bool is_turn(Motion motion) { return motion == Motion::kLeft || motion == Motion::kRight; }
+
+}  // namespace
 
 void CommandState::advance(double by_s) {
   since_s += by_s;
@@ -35,9 +40,11 @@ CommandClock::CommandClock(const Track& track, double lag_s) {
     state.first = starts_s_.empty() || starts_s_.front() == at_s;
     state.previous_lasted_s = state.first ? 0 : state.since_s;
     state.previous = state.command;
+    if (is_turn(state.command)) state.earlier_turn = state.command;
+    if (change.motion != state.command) ++state.count;
     state.command = change.motion;
     state.since_s = 0;
-    if (change.motion == Motion::kLeft || change.motion == Motion::kRight) state.last_turn = change.motion;
+    if (is_turn(change.motion)) state.last_turn = change.motion;
     if (!starts_s_.empty() && starts_s_.back() == at_s) {
       states_.back() = state;  // of two commands at one time the last counts
       continue;

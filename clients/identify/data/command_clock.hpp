@@ -16,8 +16,10 @@ inline constexpr std::array<double, 4> kDecayTimes_s = {5, 15, 40, 120};
 /// The command of a robot at an instant, and its history.
 struct CommandState {
   Motion command = Motion::kStop, previous = Motion::kStop, last_turn = Motion::kStop;
+  Motion earlier_turn = Motion::kStop;     ///< latest turn before the present command; kStop: none
   bool first = true;                       ///< true: no command came before; `previous` is kStop then
   double since_s = 0;                      ///< since the command changed
+  double count = 0;                        ///< number of changes of the command, that to the present one included
   double previous_lasted_s = 0;            ///< duration of the previous command; 0 if there was none
   std::array<double, 2> motor_s = {0, 0};  ///< motor-on time of the left and the right motor
   double driven_s = 0;                     ///< time for which either motor was on

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <map>
+#include <set>
 #include <string_view>
 
 #include "clients/identify/data/measured_set.hpp"
@@ -184,19 +185,48 @@ void import_set(const fs::path& from, const fs::path& to) {
   }
   std::error_code error;
   fs::create_directories(to, error);
-  os::write_file(
-      to / "trajectories.csv",
-      (kind == Kind::kArkLog ? "run,robot,time_s,x_mm,y_mm\n" : "run,robot,time_s,x_mm,y_mm,heading_rad\n") + text);
+  os::write_file(to / "trajectories.csv", (kind != Kind::kRecording ? "run,robot,time_s,x_mm,y_mm\n"
+                                                                    : "run,robot,time_s,x_mm,y_mm,heading_rad\n") +
+                                              text);
   for (const char* name : {"commands.csv", "commands.csv.gz"}) {
     fs::remove(to / name, error);
     if (fs::exists(from / name, error)) os::write_file(to / name, os::read_file(from / name));
   }
 }
 
-MeasuredSet load_or_import(const fs::path& directory, const fs::path& converted) {
-  if (importable(directory).empty()) return load_measured_set(directory);
+namespace {
+
+/// Names of the runs whose robots are known by their tracks only.
+std::set<std::string> unnumbered_runs(const std::vector<fs::path>& files) {
+  std::set<std::string> runs;
+  for (const fs::path& file : files)
+    if (kind_of(file) == Kind::kTrackTable && !CsvReader(file).find_column("robot")) runs.insert(name_of_run(file));
+  return runs;
+}
+
+/// Gives each track of these runs a number that no other track has, from `next` on or above all known numbers.
+void number_tracks(MeasuredSet& set, const std::set<std::string>& runs, std::uint32_t next) {
+  for (const Run& run : set.runs)
+    for (const Track& track : run.tracks)
+      if (!runs.contains(run.name)) next = std::max(next, track.robot + 1);
+  for (Run& run : set.runs) {
+    if (!runs.contains(run.name)) continue;
+    for (Track& track : run.tracks) track.robot = next++;
+  }
+}
+
+}  // namespace
+
+MeasuredSet load_or_import(const fs::path& directory, const fs::path& converted, std::uint32_t first_number) {
+  const std::vector<fs::path> files = importable(directory);
+  if (files.empty()) return load_measured_set(directory);
   import_set(directory, converted);
-  return load_measured_set(converted);
+  MeasuredSet set = load_measured_set(converted);
+  const std::set<std::string> unnumbered = unnumbered_runs(files);
+  if (unnumbered.empty()) return set;
+  number_tracks(set, unnumbered, first_number);
+  save_measured_set(set, converted);
+  return set;
 }
 
 }  // namespace kilotwin::identify

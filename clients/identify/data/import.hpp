@@ -7,6 +7,7 @@
 /// A run is named after its file, without the extension. A commands.csv in the same directory uses these names.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -32,8 +33,10 @@ inline constexpr double kArkMosaic_mm = 2000;
 /// mixture of ARK logs and recordings, and on two runs of one name.
 void import_set(const std::filesystem::path& from, const std::filesystem::path& to);
 
-/// Loads a data directory, or converts its files into `converted` first.
+/// Loads a data directory, or converts its files into `converted` first. Tracks of `kilotwin track` without numbers of robots begin
+/// anew in each film. Each of them becomes a robot of its own, with numbers from `first_number` on, or above the largest known one.
+/// Commands name such a robot by its track.
 [[nodiscard]] MeasuredSet load_or_import(const std::filesystem::path& directory,
-                                         const std::filesystem::path& converted);
+                                         const std::filesystem::path& converted, std::uint32_t first_number = 0);
 
 }  // namespace kilotwin::identify

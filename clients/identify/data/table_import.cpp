@@ -67,13 +67,12 @@ std::string rows_of_table(const fs::path& file, const TableFormat& format) {
 /// A row of a table of `kilotwin track`: one robot in one frame.
 struct TrackedRow {
   std::uint32_t robot;
-  double time_s, x, y, radius_px, heading_rad;
+  double time_s, x, y, radius_px;
 };
 
 std::vector<TrackedRow> tracked_rows(const fs::path& file, bool& calibrated) {
   CsvReader csv(file);
-  const std::size_t time = csv.column("time_s"), track = csv.column("track"), radius = csv.column("radius_px"),
-                    heading = csv.column("heading_rad");
+  const std::size_t time = csv.column("time_s"), track = csv.column("track"), radius = csv.column("radius_px");
   const auto number = csv.find_column("robot"), x_mm = csv.find_column("x_mm"), y_mm = csv.find_column("y_mm");
   calibrated = x_mm && y_mm;
   const std::size_t x = calibrated ? *x_mm : csv.column("x_px"), y = calibrated ? *y_mm : csv.column("y_px");
@@ -82,7 +81,7 @@ std::vector<TrackedRow> tracked_rows(const fs::path& file, bool& calibrated) {
     // A robot whose number is not known yet has -1: it may be any.
     if (number && csv.text(*number) == "-1") continue;
     rows.push_back({csv.whole(number ? *number : track), csv.number(time), csv.number_or_nan(x),
-                    csv.number_or_nan(y), csv.number(radius), csv.number_or_nan(heading)});
+                    csv.number_or_nan(y), csv.number(radius)});
   }
   std::erase_if(rows, [](const TrackedRow& r) { return std::isnan(r.x) || std::isnan(r.y); });
   return rows;
@@ -180,8 +179,8 @@ std::string rows_of_track_table(const fs::path& file) {
   const std::string run = run_of_file(file);
   std::string text;
   for (const TrackedRow& row : rows)
-    text += row_of(run, row.robot, row.time_s, unit_mm * (row.x - x_middle), up * unit_mm * (row.y - y_middle),
-                   row.heading_rad);
+    text += fmt::format("{},{},{:.10g},{:.10g},{:.10g}\n", run, row.robot, row.time_s, unit_mm * (row.x - x_middle),
+                        up * unit_mm * (row.y - y_middle));
   return text;
 }
 

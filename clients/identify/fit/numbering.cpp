@@ -1,8 +1,10 @@
 #include "clients/identify/fit/numbering.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <map>
 #include <random>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -77,6 +79,10 @@ Numbering numbering_of(const Fitter& fitter, const FitState& base) {
   for (std::size_t t = 0; t < tracks.size(); ++t) runs[tracks[t].run].push_back(t);
   std::erase_if(runs, [](const auto& run) { return run.second.size() < kFewestTracks; });
   if (runs.size() < 2) return {};
+  std::map<std::uint32_t, std::set<std::uint32_t>> runs_of;
+  for (const TrackBias& t : tracks) runs_of[t.robot].insert(t.run);
+  // If no number occurs in two runs, there is nothing to compare.
+  if (std::none_of(runs_of.begin(), runs_of.end(), [](const auto& of) { return of.second.size() > 1; })) return {};
   Pool all;
   for (const TrackBias& t : tracks) all.add(t);
   Numbering out;

@@ -70,6 +70,8 @@ double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
     case Covariate::kSinceRest: return s.commands.since_rest_s;
     case Covariate::kMotorTimeDifference: return s.commands.motor_s[1] - s.commands.motor_s[0];
     case Covariate::kLastTurn: return static_cast<double>(s.commands.last_turn);
+    case Covariate::kEarlierTurn: return static_cast<double>(s.commands.earlier_turn);
+    case Covariate::kCommandCount: return s.commands.count;
     case Covariate::kTraffic: return s.near.traffic[axis.radius];
     case Covariate::kRobot: return s.robot;
     case Covariate::kRun: return s.run;

@@ -72,6 +72,8 @@ enum class Covariate : std::uint8_t {
   kPreviousCommand,  ///< kNoCommand for the first command
   kPreviousLasted,   ///< duration of the previous command, s; 0 if there was none
   kLastTurn,
+  kEarlierTurn,          ///< latest turning command before the present command; 0: none
+  kCommandCount,         ///< number of changes of the command, that to the present one included
   kSinceRest,            ///< time since the last rest, s
   kMotorTimeDifference,  ///< motor-on time of the right wheel's motor minus that of the left one's, s
   kTraffic,              ///< of the floor cell, as NeighbourView::traffic

@@ -36,6 +36,8 @@ Function::Covariate covariate_of(Covariate c) {
     case Covariate::kSinceRest: return Function::SINCE_REST;
     case Covariate::kMotorTimeDifference: return Function::MOTOR_TIME_DIFFERENCE;
     case Covariate::kLastTurn: return Function::LAST_TURN;
+    case Covariate::kEarlierTurn: return Function::EARLIER_TURN;
+    case Covariate::kCommandCount: return Function::COMMAND_COUNT;
     case Covariate::kTraffic: return Function::PLACE;
     case Covariate::kRobot: return Function::ROBOT;
     case Covariate::kRun: return Function::RUN;
@@ -57,6 +59,7 @@ Situation with(const Axis& axis, double value, Situation s = {}) {
     case Covariate::kSinceCommand: s.commands.since_s = value; break;
     case Covariate::kPreviousLasted: s.commands.previous_lasted_s = value; break;
     case Covariate::kSinceRest: s.commands.since_rest_s = value; break;
+    case Covariate::kCommandCount: s.commands.count = value; break;
     case Covariate::kMotorTimeDifference: s.commands.motor_s = {0, value}; break;
     case Covariate::kNeighbours: s.near.count[axis.radius] = static_cast<float>(value); break;
     case Covariate::kMotorTime:

@@ -72,6 +72,7 @@ const char* name_of(Function::Covariate of) {
     case Function::TIME: return "time";
     case Function::TIME_SINCE_COMMAND: return "time_since_command";
     case Function::PREVIOUS_LASTED: return "duration of the previous command";
+    case Function::COMMAND_COUNT: return "number of commands";
     case Function::MOTOR_TIME: return "motor_time";
     case Function::DRIVEN_TIME: return "driven_time";
     case Function::SINCE_REST: return "time since the last rest";
@@ -143,6 +144,7 @@ std::string of_table(const proto::Table& table, Effect::Target target, Function:
       const std::string when =
           of == Function::COMMAND            ? command_name(table.key(i))
           : of == Function::PREVIOUS_COMMAND ? fmt::format("after {}", command_name(table.key(i)))
+          : of == Function::EARLIER_TURN     ? fmt::format("after an earlier turn {}", command_name(table.key(i)))
           : of == Function::LAST_TURN        ? fmt::format("after a turn {}", command_name(table.key(i)))
                                              : fmt::format("at {}", table.key(i));
       parts.push_back(fmt::format("{} {}", signed_size(table.value(i), target), when));

@@ -426,8 +426,9 @@ class RunForecasts {
     for (std::size_t k = 0; k < instants_s.size(); ++k) {
       std::vector<double> log_likelihood(models_.size(), 0.0);
       for (std::size_t i = 0; i < states.size(); ++i) log_likelihood[i / robots] += states[i][k].log_likelihood();
-      const RunAmplitude::Between between =
-          models_.size() > 1 ? amplitude_.mean(log_likelihood) : RunAmplitude::Between{};
+      const RunAmplitude::Between between = models_.size() > 1
+                                                ? drifting_.mean(instants_s[k] - times_.horizon_s, log_likelihood)
+                                                : RunAmplitude::Between{};
       Start& start =
           starts.emplace_back(Start{instants_s[k], static_cast<std::uint32_t>(first + k), {}, between.part});
       const auto add = [&](std::size_t m) {
@@ -491,6 +492,7 @@ class RunForecasts {
   os::WorkerPool& pool_;
   const bool all_, neighbours_;
   const RunAmplitude amplitude_;
+  DriftingAmplitude drifting_{amplitude_};
   std::deque<RunModel> models_;
 };
 

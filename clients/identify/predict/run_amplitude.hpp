@@ -2,6 +2,8 @@
 /// its own past.
 #pragma once
 
+#include <array>
+#include <limits>
 #include <vector>
 
 #include "clients/identify/model/motion_model.hpp"
@@ -23,10 +25,35 @@ class RunAmplitude {
   };
   /// The posterior mean amplitude, given the log likelihood of the run's past under each model.
   [[nodiscard]] Between mean(const std::vector<double>& log_likelihood) const;
+  /// Logarithm of the likelihood integrated over the prior, up to a constant.
+  [[nodiscard]] double log_evidence(const std::vector<double>& log_likelihood) const;
 
  private:
+  /// Calls take(position on the raster, log of prior times likelihood) at fine steps along the raster.
+  template <class Take> void for_each_fine(const std::vector<double>& log_likelihood, const Take& take) const;
+
   std::vector<MotionModel> models_;
   std::vector<double> log_prior_;
+};
+
+/// Follows the amplitude of a run over time. The amplitude may drift: the log likelihood of the past can fade. The time constant
+/// is the one under which the run's own past was predicted best.
+class DriftingAmplitude {
+ public:
+  explicit DriftingAmplitude(const RunAmplitude& amplitude) : amplitude_(amplitude) {}
+
+  /// The mean amplitude at time_s, given the log likelihood of the run up to then under each model. In order of time.
+  [[nodiscard]] RunAmplitude::Between mean(double time_s, const std::vector<double>& log_likelihood);
+
+ private:
+  /// Time constants, s. A minute holds about ten commands.
+  static constexpr std::array kFade_s = {std::numeric_limits<double>::infinity(), 120.0, 40.0};
+
+  const RunAmplitude& amplitude_;
+  double last_s_ = 0;
+  std::vector<double> last_;                               ///< log likelihood at the previous time
+  std::array<std::vector<double>, kFade_s.size()> faded_;  ///< by time constant: of the past, faded
+  std::array<double, kFade_s.size()> log_predictive_{};  ///< by time constant: of all increments, given their past
 };
 
 }  // namespace kilotwin::identify

@@ -24,6 +24,66 @@ void add_duration_hypotheses(DictionaryBuilder& make, const Extent& extent, std:
   make.add(kTurning, "previous-lasted", {"history"}, some(turned, 0, 4), 2);
 }
 
+/// A start that depends on the duration of the previous command, as after a long rest: after a rest, or after any command.
+void add_start_hypotheses(DictionaryBuilder& make, const Extent& extent) {
+  constexpr std::uint32_t kOverDuration = 3, kOverTime = 4;
+  Factor lasted = over(Shape::kCosines, Covariate::kPreviousLasted, 0, extent.since_s, kOverDuration);
+  Factor since = over(Shape::kCosines, Covariate::kSinceCommand, 0, extent.since_s, kOverTime);
+  for (Factor* const f : {&lasted, &since}) {
+    f->first = 0;
+    f->warp = 1;
+  }
+  const Basis any{{lasted, since}}, rested{{keyed(Shape::kTable, Covariate::kPreviousCommand, {0}), lasted, since}};
+  for (const Basis* const basis : {&any, &rested}) {
+    if (basis == &rested && !extent.has_stop) continue;
+    make.add(kSpeed, "previous-lasted", {"history", "time_since_command"},
+             some(make.put(kSpeed, *basis), 0, static_cast<Eigen::Index>(basis->size())), 2);
+  }
+}
+
+/// The play of gears: a turn against the latest one begins otherwise than one that continues it.
+void add_reversal_hypotheses(DictionaryBuilder& make, const Extent& extent) {
+  if (!extent.has_turns) return;
+  constexpr Eigen::Index kCurve = 4;
+  Factor since = over(Shape::kCosines, Covariate::kSinceCommand, 0, extent.since_s, kCurve);
+  since.first = 0;
+  since.warp = 1;
+  const std::vector<double> turns{2, 3};
+  const Basis basis{{keyed(Shape::kTable, Covariate::kCommand, turns),
+                     keyed(Shape::kTable, Covariate::kEarlierTurn, turns), since}};
+  for (const TargetGroup* group : {&kSpeed, &kTurning}) {
+    const auto bases = make.put(*group, basis);
+    for (const Eigen::Index size : {Eigen::Index{1}, kCurve}) {
+      // Left after right, and right after left.
+      std::vector<Eigen::Index> columns = some(bases, kCurve, size);
+      for (const Eigen::Index c : some(bases, 2 * kCurve, size)) columns.push_back(c);
+      std::vector<std::string> words{"history"};
+      if (size > 1) words.emplace_back("time_since_command");
+      make.add(*group, "turn-reversal", words, columns, 2);
+    }
+  }
+}
+
+/// The number of commands so far: starts wear a motor.
+void add_count_hypotheses(DictionaryBuilder& make, const Extent& extent, const std::vector<double>& moving) {
+  Factor count = over(Shape::kCosines, Covariate::kCommandCount, 0, extent.commands, 6);
+  make.curve(kSpeed, "command-count", {"history"}, Basis{{count}}, {1, 3, 6}, false);
+  if (moving.size() < 2) return;
+  count.first = 0;
+  count.count = 4;
+  const Basis each{{keyed(Shape::kTable, Covariate::kCommand, moving), count}};
+  make.add(kSpeed, "command-and-command-count", {"command", "history"},
+           some(make.put(kSpeed, each), 0, static_cast<Eigen::Index>(each.size())));
+}
+
+/// Numbers of the commands under which robots move.
+std::vector<double> moving_commands(const Extent& extent) {
+  std::vector<double> moving;
+  if (extent.has_straight) moving.push_back(1);
+  if (extent.has_turns) moving.insert(moving.end(), {2, 3});
+  return moving;
+}
+
 }  // namespace
 
 void add_motor_time_hypotheses(DictionaryBuilder& make, const Extent& extent) {
@@ -34,9 +94,7 @@ void add_motor_time_hypotheses(DictionaryBuilder& make, const Extent& extent) {
 }
 
 void add_command_hypotheses(DictionaryBuilder& make, const Extent& extent) {
-  std::vector<double> moving;
-  if (extent.has_straight) moving.push_back(1);
-  if (extent.has_turns) moving.insert(moving.end(), {2, 3});
+  const std::vector<double> moving = moving_commands(extent);
   const Basis which{{keyed(Shape::kTable, Covariate::kCommand, moving)}};
   const auto n = static_cast<Eigen::Index>(moving.size());
   for (const TargetGroup* group : {&kSpeed, &kTurning, &kSlip}) {
@@ -116,6 +174,9 @@ void add_history_hypotheses(DictionaryBuilder& make, const Extent& extent) {
     }
   }
   add_duration_hypotheses(make, extent, kStraightOnly);
+  add_start_hypotheses(make, extent);
+  add_reversal_hypotheses(make, extent);
+  add_count_hypotheses(make, extent, moving_commands(extent));
   if (!extent.has_turns) return;
   const Factor last = keyed(Shape::kTable, Covariate::kLastTurn, {2, 3});
   for (const TargetGroup* group : {&kTurning, &kSpeed, &kSlip}) {
@@ -125,9 +186,7 @@ void add_history_hypotheses(DictionaryBuilder& make, const Extent& extent) {
 }
 
 void add_inertia_hypotheses(DictionaryBuilder& make, const Extent& extent) {
-  std::vector<double> moving;
-  if (extent.has_straight) moving.push_back(1);
-  if (extent.has_turns) moving.insert(moving.end(), {2, 3});
+  const std::vector<double> moving = moving_commands(extent);
   if (moving.size() + (extent.has_stop ? 1 : 0) < 2) return;
   // The rest of the motion under the previous command, and the part that the motion under the present one still lacks.
   const Factor since = keyed(Shape::kExponential, Covariate::kSinceCommand, {0.4, 1.2, 3.6});

@@ -108,6 +108,18 @@ void add_pairs_with_robots(DictionaryBuilder& make, const Extent& extent) {
   if (extent.headings) add_pair(make, kCompass, robot, time_part(extent, 6));
 }
 
+/// A course of each run over time: temperature, batteries, light of the day.
+void add_courses_of_runs(DictionaryBuilder& make, const Extent& extent) {
+  if (extent.runs.size() < 2) return;
+  const Factor which = keyed(Shape::kTable, Covariate::kRun, {extent.runs.begin(), extent.runs.end()});
+  for (const TargetGroup* group : {&kSpeed, &kTurning}) {
+    const Basis basis{{which, time_part(extent, 6).factor}};
+    if (basis.size() > kMostColumns) continue;
+    make.add(*group, "run-and-time", {"history", "time"},
+             some(make.put(*group, basis), 0, static_cast<Eigen::Index>(basis.size())));
+  }
+}
+
 void add_other_pairs(DictionaryBuilder& make, const Extent& extent) {
   const bool commands = extent.has_straight && extent.has_turns;
   for (const TargetGroup* group : {&kSpeed, &kTurning}) {
@@ -147,8 +159,8 @@ void add_pairs_with_neighbours(DictionaryBuilder& make, const Extent& extent) {
 
 std::vector<Dictionary> general_dictionaries_of(const Extent& extent) {
   std::vector<Dictionary> all;
-  for (const auto add : {add_maps_over_time, add_drifts_over_time, add_pairs_with_robots, add_other_pairs,
-                         add_pairs_with_neighbours}) {
+  for (const auto add : {add_maps_over_time, add_drifts_over_time, add_pairs_with_robots, add_courses_of_runs,
+                         add_other_pairs, add_pairs_with_neighbours}) {
     Dictionary dictionary;
     DictionaryBuilder make(dictionary);
     add(make, extent);

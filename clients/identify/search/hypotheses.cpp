@@ -23,6 +23,7 @@ Extent extent_of(const PreparedSet& set) {
     e.duration_s = std::max(e.duration_s, end_s);
     e.motor_s = std::max({e.motor_s, last.motor_s[0], last.motor_s[1]});
     e.driven_s = std::max(e.driven_s, last.driven_s);
+    e.commands = std::max(e.commands, last.count);
     const auto note = [&](const CommandState& state) {
       e.since_rest_s = std::max(e.since_rest_s, state.since_rest_s);
       e.difference_s = std::max(e.difference_s, std::abs(state.motor_s[1] - state.motor_s[0]));

@@ -69,7 +69,7 @@ std::vector<Eigen::Index> add_place_hypotheses(DictionaryBuilder& make, const Ex
   const auto lens = make.put(kCamera, Basis{{bent}});
   for (Eigen::Index o = 1; o <= 5; ++o)
     make.add(kCamera, "position", {"position"}, some(lens, 0, (o + 1) * (o + 2) / 2 - 1));
-  if (extent.headings) map(kCompass, 2);
+  if (extent.headings) map(kCompass, 4);
   // Stripes finer than the maps resolve: mosaic seams, floor boards.
   const auto stripes = [&](const TargetGroup& group, Covariate of, double low, double high, std::uint32_t count) {
     const auto bases = make.put(group, Basis{{over(Shape::kCosines, of, low, high, count)}});

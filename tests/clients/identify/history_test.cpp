@@ -54,6 +54,18 @@ TEST(History, DurationOfThePreviousCommand) {
   }
 }
 
+TEST(History, TheEarlierTurnIsBeforeThePresentCommand) {
+  const CommandClock clock(
+      commanded({{1, Motion::kLeft}, {2, Motion::kStraight}, {4, Motion::kRight}, {6, Motion::kStop}}));
+  for (const auto& [time_s, earlier, count] :
+       {std::tuple{0.5, 0.0, 0.0}, {1.5, 0.0, 1.0}, {3.0, 2.0, 2.0}, {5.0, 2.0, 3.0}, {7.0, 3.0, 4.0}}) {
+    Situation s;
+    s.commands = clock.at(time_s);
+    EXPECT_EQ(value_of({Covariate::kEarlierTurn}, s, 0), earlier) << time_s;
+    EXPECT_EQ(value_of({Covariate::kCommandCount}, s, 0), count) << time_s;
+  }
+}
+
 TEST(History, ARestResetsTheTimeSinceIt) {
   const CommandClock clock(
       commanded({{1, Motion::kStraight}, {4.5, Motion::kLeft}, {6, Motion::kStop}, {9, Motion::kRight}}));

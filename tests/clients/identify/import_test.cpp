@@ -118,12 +118,33 @@ TEST_F(ImportTest, TablesOfTheCameraTrackerInMillimetres) {
        "1,0.1,0,120,50,11,0.5,off\n1,0.1,4,100,250,11,nan,red\n");
   const MeasuredSet set = imported();
   ASSERT_EQ(set.tracks(), 2U);
-  EXPECT_TRUE(set.has_headings);
+  EXPECT_FALSE(set.has_headings) << "they follow from the positions";
   EXPECT_EQ(set.runs[0].tracks[1].robot, 4U);
   EXPECT_DOUBLE_EQ(set.runs[0].tracks[0].samples[1].x_mm, 15);
   EXPECT_DOUBLE_EQ(set.runs[0].tracks[0].samples[1].y_mm, 150) << "y upwards";
-  EXPECT_TRUE(std::isnan(set.runs[0].tracks[0].samples[0].heading_rad));
   EXPECT_DOUBLE_EQ(set.runs[0].tracks[1].samples[0].y_mm, -150);
+}
+
+TEST_F(ImportTest, TracksWithoutRobotsAreOtherRobotsInEachFilm) {
+  const std::string head = "frame,time_s,track,x_px,y_px,radius_px,heading_rad,led";
+  const std::string rows = "\n0,0,0,100,50,11,nan,off\n1,0.1,4,100,250,11,nan,red\n";
+  give("one.csv", head + rows);
+  give("two.csv", head + rows);
+  give("commands.csv", "run,robot,time_s,motion\none,4,0,left\ntwo,0,0,right\n");
+  for (const std::uint32_t first : {0U, 7U}) {
+    const MeasuredSet set = load_or_import(folder_ / "from", folder_ / "to", first);
+    EXPECT_EQ(set.robots(), (std::vector<std::uint32_t>{first, first + 1, first + 2, first + 3}));
+    EXPECT_EQ(set.runs[0].tracks[1].commands.back().motion, Motion::kLeft);
+    EXPECT_EQ(set.runs[1].tracks[0].commands.back().motion, Motion::kRight);
+    const MeasuredSet again = load_measured_set(folder_ / "to");
+    EXPECT_EQ(again.robots(), set.robots());
+    EXPECT_EQ(again.runs[0].tracks[1].commands.back().motion, Motion::kLeft);
+  }
+  // A robot that the station has identified keeps its number in all films.
+  give("one.csv", head + ",robot\n0,0,0,100,50,11,nan,off,12\n");
+  give("two.csv", head + ",robot\n0,0,0,100,50,11,nan,off,12\n");
+  fs::remove(folder_ / "from" / "commands.csv");
+  EXPECT_EQ(load_or_import(folder_ / "from", folder_ / "to", 7).robots(), (std::vector<std::uint32_t>{12}));
 }
 
 TEST_F(ImportTest, RecordingsWithHeadingsAndCommands) {

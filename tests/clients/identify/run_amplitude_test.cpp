@@ -59,5 +59,54 @@ TEST(RunAmplitude, ThePosteriorFollowsTheData) {
   }
 }
 
+/// Log likelihoods of the models of a run whose gain is `truth(time)`: ten samples of sd 0.02 every 5 s.
+template <class Truth>
+double gain_at_the_end(const RunAmplitude& amplitude, double end_s, const Truth& truth, bool drifting) {
+  DriftingAmplitude follows(amplitude);
+  std::vector<double> log_likelihood(amplitude.models().size(), 0);
+  RunAmplitude::Between mean;
+  for (double time_s = 5; time_s <= end_s; time_s += 5) {
+    for (std::size_t i = 0; i < log_likelihood.size(); ++i)
+      log_likelihood[i] -= 10 * 0.5 * std::pow((gain_of(amplitude.models()[i], 9) - truth(time_s)) / 0.02, 2);
+    mean = follows.mean(time_s, log_likelihood);
+  }
+  if (!drifting) mean = amplitude.mean(log_likelihood);
+  const double low = gain_of(amplitude.models()[mean.low], 9), high = gain_of(amplitude.models()[mean.high], 9);
+  return low + mean.part * (high - low);
+}
+
+TEST(RunAmplitude, ADriftIsFollowed) {
+  const RunAmplitude amplitude(with_speeds_of_runs({-0.1, 0.2, 0.05, -0.03}), 9);
+  const auto falls = [](double time_s) { return 0.2 - 0.4 * time_s / 200; };
+  EXPECT_GT(gain_at_the_end(amplitude, 200, falls, false), -0.02);  // the mean over the run
+  EXPECT_LT(gain_at_the_end(amplitude, 200, falls, true), -0.1);
+}
+
+TEST(RunAmplitude, WithoutDriftTheWholePastCounts) {
+  const RunAmplitude amplitude(with_speeds_of_runs({-0.1, 0.2, 0.05, -0.03}), 9);
+  const auto noisy = [](double time_s) { return 0.07 + 0.006 * std::cos(7.3 * time_s); };
+  EXPECT_EQ(gain_at_the_end(amplitude, 200, noisy, true), gain_at_the_end(amplitude, 200, noisy, false));
+}
+
+TEST(RunAmplitude, ARunOutsideTheFitHasACourseOfItsOwn) {
+  // Runs 0 and 1 rise and fall over 100 s by 0.2: a run outside the fit gets one amplitude from their spread.
+  MotionModel model = with_speeds_of_runs({0, 0});
+  Factor course;
+  course.shape = Factor::Shape::kCosines;
+  course.axis.of = Covariate::kTime;
+  course.high = 100;
+  course.first = 0;
+  course.count = 2;
+  model.terms[0].blocks[0].basis.factors.push_back(course);
+  model.terms[0].coefficients = Eigen::Vector4d(0, 0.2, 0, -0.2);
+  model.terms[0].precision = Eigen::Vector4d::Ones();
+  EXPECT_EQ(RunAmplitude(model, 1).models().size(), 1u);
+  const RunAmplitude amplitude(model, 9);
+  ASSERT_EQ(amplitude.models().size(), 13u);
+  EXPECT_NEAR(gain_of(amplitude.models()[6], 9), 0, 1e-12);
+  // The root mean square of 0.2 cos over whole half-waves, for two runs: times sqrt(2 (1 + 1/2)), at four standard deviations.
+  EXPECT_NEAR(gain_of(amplitude.models()[12], 9), 4 * 0.2 / std::sqrt(2) * std::sqrt(3), 1e-6);
+}
+
 }  // namespace
 }  // namespace kilotwin::identify

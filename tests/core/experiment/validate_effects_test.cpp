@@ -24,6 +24,15 @@ TEST_F(ValidateEffects, AcceptsValidEffects) {
       "");
 }
 
+TEST_F(ValidateEffects, TablesTakeCommandsAndTheirNumber) {
+  for (const std::string of :
+       {"COMMAND", "PREVIOUS_COMMAND", "LAST_TURN", "EARLIER_TURN", "COMMAND_COUNT", "ROBOT", "RUN"}) {
+    const std::string effect =
+        "effect { name: 'a' acts_on: TURN_RATE function { of: " + of + " table { key: [2, 3] value: [1, 2] } } }";
+    EXPECT_EQ(check_error(kRobots + effect), "") << of;
+  }
+}
+
 TEST_F(ValidateEffects, EpisodesNeedRateAndLength) {
   const std::string head =
       kRobots + "effect { name: 'a' acts_on: WHEEL_GAIN function { constant: -1 }\n function { ";

@@ -3,17 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tests/identify/truth/effect_parts.hpp"
+
 namespace kilotwin::truth {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
-
-void slow_both(Push& push, double factor) {
-  push.gain.left *= factor;
-  push.gain.right *= factor;
-}
-
-double square(double x) { return x * x; }
 
 /// Calls `look` for every other robot with the offset of its disc along x and y and its distance, mm.
 template <class Look> void for_others(const Situation& at, const Look& look) {

@@ -41,7 +41,8 @@ void write_data(const Scene& scene, const std::vector<Run>& runs, const std::fil
     }
     for (std::size_t robot = 0; robot < run.orders.size(); ++robot) {
       for (const Order& order : run.orders[robot]) {
-        orders += fmt::format("{},{},{:.3f},{}\n", run.number, robot, order.time_s, word(order.motion));
+        orders += fmt::format("{},{},{:.3f},{}\n", run.number, robot, order.time_s + scene.commands_late_s,
+                              word(order.motion));
       }
     }
   }
@@ -77,8 +78,11 @@ void write_truth(const Scene& scene, const Play& play, double oracle_rmse_mm, do
                   {"factor_sd", scene.factor_sd},
                   {"step_s", scene.step_s},
                   {"factor_variance_s", scene.factor_sd * scene.factor_sd * scene.step_s}};
-  out["tracker"] = {
-      {"sd_mm", scene.tracker_sd_mm}, {"heading", scene.heading}, {"heading_sd_rad", scene.heading_sd_rad}};
+  out["tracker"] = {{"sd_mm", scene.tracker_sd_mm},
+                    {"heading", scene.heading},
+                    {"heading_sd_rad", scene.heading_sd_rad},
+                    {"coarse", scene.coarse},
+                    {"commands_late_s", scene.commands_late_s}};
   out["room"] = {{"width_mm", scene.width_mm}, {"height_mm", scene.height_mm}, {"contacts", scene.contacts}};
   out["bias_mm_s"] = ordered_json::array();
   for (const Individual& i : play.individuals) out["bias_mm_s"].push_back({i.bias_mm_s.left, i.bias_mm_s.right});

@@ -223,8 +223,10 @@ class Watch {
 
 }  // namespace
 
-std::vector<Prediction> predict(const Scene& scene, const std::vector<Individual>& individuals, const Run& run,
+std::vector<Prediction> predict(const Scene& truth, const std::vector<Individual>& individuals, const Run& run,
                                 double horizon_s, int samples, std::uint64_t seed) {
+  Scene scene = truth;
+  std::erase_if(scene.effects, [](const Effect& effect) { return effect.by_chance; });
   Dice dice(seed);
   Watch watch(scene, individuals, run);
   const std::size_t robots = individuals.size();

@@ -83,8 +83,9 @@ Run play_run(const Scene& scene, const std::vector<Individual>& individuals, int
       const View view = world.view(robot);
       if (next_s == mark_s) run.marks[i].push_back(view);
       if (next_s != sample_s) continue;
-      const Vec noise{dice.normal(), dice.normal()};
+      Vec noise{dice.normal(), dice.normal()};
       const double heading_noise = dice.normal();
+      if (scene.coarse > 0 && dice.uniform() < scene.coarse) noise = {kCoarse * noise.x, kCoarse * noise.y};
       if (dice.uniform() < scene.missing || (next_s > gaps[i].from_s && next_s < gaps[i].until_s)) continue;
       tracks[i].push_back(
           {number,

@@ -5,56 +5,11 @@
 
 #include "tests/identify/truth/dice.hpp"
 #include "tests/identify/truth/effects.hpp"
+#include "tests/identify/truth/laboratories.hpp"
+#include "tests/identify/truth/laboratory_effects.hpp"
 
 namespace kilotwin::truth {
 namespace {
-
-// Laboratories: tracker, sampling, drive and arena.
-
-/// Headings, low tracker noise, disc centres tracked.
-Scene tidy_lab() { return {}; }
-
-/// No headings; the tracker follows the point between the wheels.
-Scene blind_lab() {
-  Scene s;
-  s.heading = false;
-  s.tracked_ahead_mm = 0;
-  s.tracker_sd_mm = 0.6;
-  return s;
-}
-
-/// Irregular frames, many missing, gaps of 10 s, no headings.
-Scene poor_lab() {
-  Scene s;
-  s.heading = false;
-  s.jitter = 0.4;
-  s.missing = 0.15;
-  s.gap_share = 0.3;
-  s.tracker_sd_mm = 0.8;
-  return s;
-}
-
-/// A drive with its reference point at the disc centre, no walls, low noise.
-Scene plain_lab() {
-  Scene s;
-  s.disc_ahead_mm = s.tracked_ahead_mm = 0;
-  s.width_mm = s.height_mm = 0;
-  s.factor_sd = 0.08;
-  s.heading_sd_rad = 0.02;
-  s.bias_sd_mm_s = 1.86;
-  return s;
-}
-
-/// Many robots in a small arena.
-Scene crowded_lab() {
-  Scene s;
-  s.robots = 24;
-  s.width_mm = s.height_mm = 480;
-  s.train_runs = 3;
-  s.train_s = 150;
-  s.test_s = 90;
-  return s;
-}
 
 Scene with(Scene scene, std::vector<Effect> effects) {
   scene.effects = std::move(effects);
@@ -210,6 +165,88 @@ const Entry kEntries[] = {
      [] {
        return with(poor_lab(), Effects{battery_by_the_clock(), slow_robots()});
      }},
+    // Suspicions of engineers, in laboratories of all kinds.
+    {"backlash", "history: the play of the gears when the direction of turning changes",
+     [] { return with(brisk_lab(), Effects{backlash()}); }},
+    {"stiction", "history: robots start late after a long rest",
+     [] {
+       Scene s = with(brisk_lab(), Effects{stiction()});
+       s.stop_share = 0.3;
+       return s;
+     }},
+    {"warm-turns", "history: turns are faster after a long drive ahead",
+     [] { return with(tidy_lab(), Effects{warm_turns()}); }},
+    {"shared-current", "command: the left wheel is weak while both motors run",
+     [] { return with(sparse_lab(), Effects{shared_current()}); }},
+    {"many-commands", "history: turns are weak after so many commands",
+     [] { return with(tidy_lab(), Effects{many_commands()}); }},
+    {"low-battery", "motor_time: speed holds, then falls",
+     [] { return with(small_lab(), Effects{low_battery()}); }},
+    {"thermal-wave", "history and time: the temperature of the day, which runs meet at different hours",
+     [] { return with(tidy_lab(), Effects{thermal_wave()}); }},
+    {"gusts", "world_frame and time: gusts that repeat", [] { return with(tidy_lab(), Effects{gusts()}); }},
+    {"gusts-blind", "the same, with one frame a second and no headings",
+     [] { return with(sparse_lab(), Effects{gusts()}); }},
+    {"rising-noise", "noise: speeds vary more and more", [] { return with(tidy_lab(), Effects{rising_noise()}); }},
+    {"bowl", "world_frame and position: the floor sags", [] { return with(poor_lab(), Effects{bowl()}); }},
+    {"drawing-walls", "world_frame and position: robots are drawn to two walls",
+     [] {
+       Scene s = with(tidy_lab(), Effects{drawing_walls()});
+       s.width_mm = s.height_mm = 880;  // in the small size the walls are at +-330 mm
+       return s;
+     }},
+    {"two-patches", "position: one patch slows, the other speeds up",
+     [] { return with(blind_lab(), Effects{two_patches()}); }},
+    {"outer-turn", "position: robots turn beyond a distance from the middle",
+     [] { return with(tidy_lab(), Effects{outer_turn()}); }},
+    {"moving-shadow", "position and time: a shadow crosses the arena",
+     [] { return with(tidy_lab(), Effects{moving_shadow()}); }},
+    {"growing-puddle", "position and time: a wet spot spreads",
+     [] { return with(blind_lab(), Effects{growing_puddle()}); }},
+    {"patch-of-some-more", "position and robot: a patch slows each robot by another amount",
+     [] { return with(tidy_lab(), Effects{patch_of_some_more()}); }},
+    {"replaced-robots", "robot and time: two robots are replaced during each run",
+     [] { return with(tidy_lab(), Effects{replaced_robots()}); }},
+    {"driving-crowd", "neighbours: robots are slow among others that drive",
+     [] { return with(crowded_lab(), Effects{driving_crowd()}); }},
+    {"slow-leader", "neighbours and robot: robots near robot 0 are slow",
+     [] { return with(crowded_lab(), Effects{slow_leader()}); }},
+    {"bent-headings", "measurement: measured headings are off, by place",
+     [] { return with(tidy_lab(), Effects{bent_headings()}); }},
+    {"parallax", "measurement and robot: tall robots under a low camera",
+     [] { return with(tidy_lab(), Effects{parallax()}); }},
+    {"backlash-battery", "history and time, commands stamped late",
+     [] {
+       return with(late_lab(), Effects{backlash(), battery_by_the_clock()});
+     }},
+    {"bowl-patches", "world_frame and position, in an oblong arena",
+     [] {
+       return with(sparse_lab(), Effects{bowl(), two_patches()});
+     }},
+    {"gusts-replaced", "world_frame and time, robot and time",
+     [] {
+       Scene s = with(small_lab(), Effects{gusts(), replaced_robots()});
+       s.robots = 6;
+       return s;
+     }},
+    {"thermal-shadow", "history and time, position and time",
+     [] {
+       return with(brisk_lab(), Effects{thermal_wave(), moving_shadow()});
+     }},
+    {"leader-puddle", "neighbours, position and time",
+     [] {
+       return with(crowded_lab(), Effects{slow_leader(), growing_puddle()});
+     }},
+    {"current-stiction", "command, history",
+     [] {
+       return with(poor_lab(), Effects{shared_current(), stiction()});
+     }},
+    {"stalls", "no effect that can be known: motors stall at random",
+     [] { return with(tidy_lab(), Effects{stalls()}); }},
+    {"stalls-patch", "position, and motors that stall at random",
+     [] {
+       return with(tidy_lab(), Effects{stalls(), slow_patch()});
+     }},
     // Near the noise level.
     {"faint-grain", "heading, a fifth as strong", [] { return with(tidy_lab(), Effects{grain(0.2)}); }},
     {"faint-battery", "time, a fifth as strong",
@@ -221,6 +258,16 @@ const Entry kEntries[] = {
     {"nothing-poor", "no effect", [] { return poor_lab(); }},
     {"nothing-plain", "no effect", [] { return plain_lab(); }},
     {"nothing-crowded", "no effect", [] { return crowded_lab(); }},
+    {"nothing-brisk", "no effect", [] { return brisk_lab(); }},
+    {"nothing-sparse", "no effect", [] { return sparse_lab(); }},
+    {"nothing-few", "no effect", [] { return small_lab(); }},
+    {"nothing-late", "no effect, commands stamped late", [] { return late_lab(); }},
+    {"nothing-coarse", "no effect, one position in 25 with eight times the noise",
+     [] {
+       Scene s = tidy_lab();
+       s.coarse = 0.04;
+       return s;
+     }},
     // Faults of the data.
     {"swapped", "robots 3 and 9 exchange their numbers in run 1",
      [] {

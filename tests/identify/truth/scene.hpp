@@ -42,6 +42,10 @@ struct Situation {
   double trodden_s = 0;                     // driven time of all robots on this spot of the floor in this run
   const std::vector<Vec>* discs = nullptr;  // of all robots, this one included
   double since_other_s = 1e9;               // since another driven robot was on this spot of the floor in this run
+  Motion last_turn = Motion::kStop;         // latest turn before the present motion; kStop: none
+  double before_s = 0;                      // duration of the previous motion
+  int commands = 0;                         // number of motions commanded in this run, the present one included
+  const std::vector<Motion>* motions = nullptr;  // of all robots
   bool driven() const { return motion != Motion::kStop; }
 };
 
@@ -73,6 +77,8 @@ struct Effect {
   std::function<void(const Situation&, View&)> see;
   /// Factor of the standard deviation of f; may be empty.
   std::function<double(const Situation&)> noise = {};
+  /// Chance events, which no predictor can know: the oracle does without them, and no finding has to name them.
+  bool by_chance = false;
 };
 
 /// A fault of the data.
@@ -126,10 +132,14 @@ struct Scene {
   double tracker_sd_mm = 0.4;
   bool heading = true;
   double heading_sd_rad = 0.04;
+  double coarse = 0;           // share of positions with kCoarse times the noise
+  double commands_late_s = 0;  // by which commands are stamped late
 
   std::vector<Effect> effects;
   std::vector<Fault> faults;  // in training runs
 };
+
+constexpr double kCoarse = 8;
 
 /// Standard deviation of f in a step of `dt`.
 inline double factor_sd(const Scene& scene, const Situation& at, double dt) {

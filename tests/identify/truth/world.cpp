@@ -120,6 +120,7 @@ Memory::Memory(const Scene& scene, int run, const std::vector<std::vector<Order>
     : orders_(&orders),
       run_(run),
       robots_(static_cast<std::size_t>(scene.robots)),
+      motions_(robots_.size(), Motion::kStop),
       spot_mm_(scene.spot_mm),
       spot_corner_(scene.spot_corner),
       spots_(2 * static_cast<int>(kFloor_mm / 2 / scene.spot_mm) + 1),
@@ -142,9 +143,12 @@ void Memory::take_orders() {
     while (robot.next < orders.size() && orders[robot.next].time_s <= time_s_ + 1e-9) {
       const Motion motion = orders[robot.next++].motion;
       if (motion == robot.motion) continue;
+      if (robot.motion == Motion::kLeft || robot.motion == Motion::kRight) robot.last_turn = robot.motion;
       robot.before = robot.motion;
-      robot.motion = motion;
+      robot.before_s = robot.since_s;
+      robot.motion = motions_[i] = motion;
       robot.since_s = 0;
+      ++robot.commands;
     }
   }
 }
@@ -195,7 +199,11 @@ Situation Memory::situation(int robot, Vec disc, double heading_rad, const std::
           r.since_rest_s,
           trodden_s_[spot(disc)],
           &discs,
-          time_s_ - static_cast<double>(passages.last == robot ? passages.other_s : passages.last_s)};
+          time_s_ - static_cast<double>(passages.last == robot ? passages.other_s : passages.last_s),
+          r.last_turn,
+          r.before_s,
+          r.commands,
+          &motions_};
 }
 
 World::World(const Scene& scene, const std::vector<Individual>& individuals, Memory memory,

@@ -41,7 +41,7 @@ class Memory {
   void go_to(double time_s, const std::vector<Vec>& discs);
   /// The next change of any robot's order; infinity if there is none.
   double next_change_s() const;
-  /// A robot's situation now, at `disc`. `discs` must outlive it.
+  /// A robot's situation now, at `disc`. `discs` and this object must outlive it.
   Situation situation(int robot, Vec disc, double heading_rad, const std::vector<Vec>& discs) const;
 
  private:
@@ -51,6 +51,9 @@ class Memory {
     double since_s = 0;
     Wheels<double> driven_s;
     double since_rest_s = 0;
+    Motion last_turn = Motion::kStop;
+    double before_s = 0;
+    int commands = 0;
   };
   /// The robots that drove over a spot last.
   struct Passages {
@@ -64,6 +67,7 @@ class Memory {
   int run_;
   double time_s_ = 0;
   std::vector<Robot> robots_;
+  std::vector<Motion> motions_;  // by robot
   double spot_mm_;
   Vec spot_corner_;
   int spots_;                     // along a side of the floor

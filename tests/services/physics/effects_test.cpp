@@ -320,17 +320,21 @@ TEST(Effects, CovariatesOfPastCommandsMatchTheirDefinitions) {
   // Covariates during the last of these commands, in its first tick and later ones.
   struct Case {
     std::vector<std::pair<std::uint8_t, std::uint8_t>> duties;
-    double previous, turn;
+    double previous, turn, earlier_turn, count;
   };
-  const Case cases[] = {{{{70, 70}}, 0, 0},
-                        {{{70, 0}}, 0, 2},
-                        {{{70, 70}, {0, 70}}, 1, 3},
-                        {{{70, 0}, {70, 70}}, 2, 2},
-                        {{{70, 0}, {0, 70}, {0, 0}, {70, 70}}, 0, 3},
-                        {{{70, 0}, {70, 70}, {0, 70}, {70, 70}}, 3, 3}};
-  for (const std::string covariate : {"PREVIOUS_COMMAND", "LAST_TURN", "PREVIOUS_LASTED"}) {
+  const Case cases[] = {{{{70, 70}}, 0, 0, 0, 1},
+                        {{{70, 0}}, 0, 2, 0, 1},
+                        {{{70, 70}, {0, 70}}, 1, 3, 0, 2},
+                        {{{70, 0}, {70, 70}}, 2, 2, 2, 2},
+                        {{{70, 0}, {70, 70}, {0, 70}}, 1, 3, 2, 3},
+                        {{{70, 0}, {0, 70}, {0, 0}, {70, 70}}, 0, 3, 3, 4},
+                        {{{70, 0}, {70, 70}, {0, 70}, {70, 70}}, 3, 3, 3, 4}};
+  for (const std::string covariate :
+       {"PREVIOUS_COMMAND", "LAST_TURN", "EARLIER_TURN", "COMMAND_COUNT", "PREVIOUS_LASTED"}) {
     for (const Case& c : cases) {
       const double expected = covariate == "LAST_TURN"          ? c.turn
+                              : covariate == "EARLIER_TURN"     ? c.earlier_turn
+                              : covariate == "COMMAND_COUNT"    ? c.count
                               : covariate == "PREVIOUS_COMMAND" ? c.previous
                                                                 : (c.duties.size() > 1 ? 4 * kTick_s : 0);
       const RunPlan plan =
