@@ -1,5 +1,6 @@
 #include "services/behaviours/budget_register.hpp"
 
+#include <algorithm>
 #include <array>
 #include <bitset>
 #include <map>
@@ -71,12 +72,11 @@ std::string with_free_budget_register(std::string_view assembly) {
   return result;
 }
 
-bool may_overwrite_budget(std::string_view function) {
+bool may_overwrite_budget(std::string_view callee) {
   constexpr std::array<std::string_view, 4> kComplex{"__mulsc3", "__muldc3", "__divsc3", "__divdc3"};
-  for (const std::string_view name : kComplex) {
-    if (function.starts_with(name)) return true;
-  }
-  return false;
+  // The operand may be "NAME@PLT", or "*NAME@GOTPCREL(%rip)" with compilers that avoid the table of procedures.
+  return std::any_of(kComplex.begin(), kComplex.end(),
+                     [&](std::string_view name) { return callee.find(name) != std::string_view::npos; });
 }
 
 }  // namespace kilotwin::behaviours

@@ -11,12 +11,14 @@ struct NeedsAllVectorRegisters {
   std::string function;
 };
 
-/// Returns a compiler's assembly without its own use of the register. A function that uses it gets another one that it does not use.
-/// No instruction changes but by the name of the register. All vector registers belong to the function that runs (System V).
-/// Throws NeedsAllVectorRegisters.
+/// Returns a compiler's assembly without its own use of the register: that of clang, for gcc leaves it alone by -ffixed-xmm15. A
+/// function that uses it gets another one that it does not use. No instruction changes but by the name of the register. All vector
+/// registers belong to the function that runs (System V), also if it is called within its file: clang allocates registers function
+/// by function, gcc with -fno-ipa-ra. Throws NeedsAllVectorRegisters.
 [[nodiscard]] std::string with_free_budget_register(std::string_view assembly);
 
-/// Whether this is a function of libgcc that uses vector registers at will: products and quotients of complex numbers.
-[[nodiscard]] bool may_overwrite_budget(std::string_view function);
+/// Whether the operand of a call names a function of libgcc that uses vector registers at will: products and quotients of complex
+/// numbers.
+[[nodiscard]] bool may_overwrite_budget(std::string_view callee);
 
 }  // namespace kilotwin::behaviours

@@ -72,8 +72,10 @@ Arguments code_flags(const Compiler& compiler) {
       flags.emplace_back("-enable-trivial-auto-var-init-zero-knowing-it-will-be-removed-from-clang");
     }
   } else {
+    // xmm15 holds the cycle budget (runtime/budget.h). -fno-ipa-ra: a caller keeps no value in a vector register across a call, so
+    // that a robot that stops in a function without vectors has none to save.
     append(flags, {"-fno-tree-loop-distribute-patterns", "-funsigned-bitfields",
-                   "-fno-isolate-erroneous-paths-dereference"});
+                   "-fno-isolate-erroneous-paths-dereference", "-ffixed-xmm15", "-fno-ipa-ra"});
   }
   return flags;
 }
@@ -222,10 +224,6 @@ std::string counted_assembly(const Arguments& compiler, const fs::path& source, 
   try {
     return with_cycle_counters(*assembly);
   } catch (const NeedsAllVectorRegisters& one) {
-    // gcc can do without the register; its other code may change with it.
-    arguments.emplace_back("-ffixed-xmm15");
-    assembly = assembly_of(arguments, place, errors);
-    if (assembly) return with_cycle_counters(*assembly);
     throw UserError(sources.front().string() + ":1:1: error: " + one.function +
                     "() computes with more floating-point values at a time than fit into registers; split it, or "
                     "compile with gcc");

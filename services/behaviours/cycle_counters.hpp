@@ -9,7 +9,7 @@
 namespace kilotwin::behaviours {
 
 /// Part of the cache key of compiled programs. Raise it when this pass or with_loop_barriers() changes its output.
-inline constexpr int kCountersVersion = 17;
+inline constexpr int kCountersVersion = 18;
 
 /// kTestsOnly counts one cycle per test, and no others. It is for kilolib, which a robot runs in another form.
 enum class Counted : bool { kAll, kTestsOnly };

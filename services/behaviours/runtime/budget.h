@@ -1,5 +1,6 @@
 /* The cycle budget of the code that runs: image_abi.h. While a robot's code runs, the lowest 32 bits of xmm15 hold it. Bits 32 to 63
- * are 0, or count down from 1 with each piece of code that may write memory. The others are 0. In memory, each counter would wait
+ * are 1 only if no memory was written since watch_writes(): each piece of code that may write counts them down, and a switch to the
+ * host clears them. The others are 0. In memory, each counter would wait
  * for the one before it to pass through the store buffer. A general-purpose register would be one less for the compiler, whose
  * code the estimate of cycles depends on. */
 #ifndef KILOTWIN_BUDGET_H

@@ -1,9 +1,13 @@
-// The register of the cycle budget: compilers' own use of it gets another register, in the text and in programs that run. Its second
-// part counts writes.
+// The register of the cycle budget: compilers' own use of it gets another register. Programs of many floats run. The register's
+// second part counts writes.
 #include "services/behaviours/budget_register.hpp"
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstring>
+
+#include "core/math/elementary.h"
 #include "services/behaviours/assembly.hpp"
 #include "services/behaviours/cycle_counters.hpp"
 #include "tests/services/behaviours/swarm.hpp"
@@ -55,6 +59,11 @@ TEST(BudgetRegister, IsKeptWhileComplexNumbersAreMultiplied) {
   const std::string text = with_cycle_counters(function("f", "\tcall\t__muldc3@PLT\n\tcall\tother\n"));
   EXPECT_TRUE(has(text, "\tmovd\t%xmm15, %gs:24\n\tcall\t__muldc3@PLT\n\tmovd\t%gs:24, %xmm15\n")) << text;
   EXPECT_FALSE(has(text, "\tmovd\t%xmm15, %gs:24\n\tcall\tother")) << text;
+}
+
+TEST(BudgetRegister, IsKeptIfTheCallGoesThroughATable) {
+  const std::string text = with_cycle_counters(function("f", "\tcall\t*__divsc3@GOTPCREL(%rip)\n"));
+  EXPECT_TRUE(has(text, "\tmovd\t%gs:24, %xmm15\n")) << text;
 }
 
 bool writes(const std::string& instruction) {
@@ -118,6 +127,91 @@ TEST(BudgetRegister, AProgramOfManyFloatsRunsAcrossTicks) {
   EXPECT_EQ(swarm.frame().motor_left[1], 1);
   EXPECT_EQ(swarm.frame().motor_right[1], 1);
   EXPECT_EQ(swarm.hosts[0]->robots_failed(), 0u);
+}
+
+/// The motors that a program of one robot has set, once the left one runs; at most 400 ticks.
+std::pair<int, int> motors_of(const std::string& body) {
+  Swarm swarm({program(body)}, 2);
+  swarm.start();
+  for (int ticks = 0; swarm.frame().motor_left[1] == 0 && ticks < 400; ++ticks) swarm.steps(1);
+  EXPECT_EQ(swarm.hosts[0]->robots_failed(), 0u);
+  return {swarm.frame().motor_left[1], swarm.frame().motor_right[1]};
+}
+
+TEST(BudgetRegister, AValueLivesAcrossACallOfAFunctionWithManyFloats) {
+  // Interprocedural allocation would keep `x` in a vector register that many() does not use, the last one.
+  EXPECT_EQ(
+      motors_of("static volatile float start = 1; static volatile int rounds; static float out;\n"
+                "static __attribute__((noinline)) float many(int n) {\n"
+                "  float a = start, b = a + 1, c = b + 1, d = c + 1, e = d + 1, f = e + 1, h = f + 1, i = h + 1;\n"
+                "  float j = i + 1, k = j + 1, l = k + 1, m = l + 1, o = m + 1;\n"
+                "  for (int x = 0; x < n; ++x) {\n"
+                "    float s = start;\n"
+                "    a += s; b += s * a; c += s * b; d += s * c; e += s * d; f += s * e; h += s * f; i += s * h;\n"
+                "    j += s * i; k += s * j; l += s * k; m += s * l; o += s * m;\n"
+                "  }\n"
+                "  return a + b * c + d * e + f * h + i * j + k * l + m * o;\n"
+                "}\n"
+                "static void loop(void) {\n"
+                "  float x = start;\n"
+                "  float y = many(rounds);\n"
+                "  out = x + y;\n"
+                "  set_motors(10, out == 408 ? 20 : 0);\n"
+                "}"),
+      std::pair(10, 20));
+}
+
+TEST(BudgetRegister, ValuesLiveAcrossACallThatStopsInAFunctionWithoutVectors) {
+  // count() takes several ticks and holds no float; its caller holds eleven.
+  EXPECT_EQ(
+      motors_of(
+          "static volatile float start = 1;\n"
+          "static __attribute__((noinline)) uint32_t count(uint32_t n) {\n"
+          "  uint32_t sum = 0;\n"
+          "  for (uint32_t r = 0; r < n; ++r) sum = sum * 3 + r;\n"
+          "  return sum;\n"
+          "}\n"
+          "static void loop(void) {\n"
+          "  float a = start, b = start + 1, c = start + 2, d = start + 3, e = start + 4, f = start + 5;\n"
+          "  float g = start + 6, h = start + 7, i = start + 8, j = start + 9, k = start + 10;\n"
+          "  uint32_t sum = count(30000);\n"
+          "  float all = a + 2 * b + 3 * c + 4 * d + 5 * e + 6 * f + 7 * g + 8 * h + 9 * i + 10 * j + 11 * k;\n"
+          "  set_motors(10, all == 506 && sum != 1 ? 20 : 0);\n"
+          "}"),
+      std::pair(10, 20));
+}
+
+TEST(BudgetRegister, FunctionsOfTheMathematicalLibraryHaveTheirSigns) {
+  // Bit by bit those of core/math, for arguments of both signs; the host's own build has the budget in no register.
+  const double ys[] = {1, -1, 0.3, -2.5}, xs[] = {1, -1, -0.2, 3};
+  double all[4][4] = {};
+  for (int i = 0; i < 4; ++i) {
+    all[i][0] = kt_atan2(ys[i], xs[i]), all[i][1] = kt_atan(ys[i]), all[i][2] = kt_sin(ys[i]),
+    all[i][3] = kt_exp(ys[i]);
+  }
+  std::uint64_t sum = 0;  // a hash of the bits
+  for (const auto& of : all)
+    for (const double value : of) {
+      std::uint64_t bits = 0;
+      std::memcpy(&bits, &value, sizeof bits);
+      sum = sum * 31 + (bits ^ bits >> 32);  // folded: two wrong signs do not cancel
+    }
+  EXPECT_EQ(
+      motors_of(
+          "#include <math.h>\n#include <string.h>\n"
+          "static volatile double ys[] = {1, -1, 0.3, -2.5}, xs[] = {1, -1, -0.2, 3};\n"
+          "static uint64_t sum;\n"
+          "static void add(double value) { uint64_t b; memcpy(&b, &value, 8); sum = sum * 31 + (b ^ b >> 32); }\n"
+          "static void loop(void) {\n"
+          "  sum = 0;\n"
+          "  for (uint8_t i = 0; i < 4; ++i) {\n"
+          "    add(atan2(ys[i], xs[i])); add(atan(ys[i])); add(sin(ys[i])); add(exp(ys[i]));\n"
+          "  }\n"
+          "  set_motors(10, sum == " +
+          std::to_string(sum) +
+          "ull ? 20 : 0);\n"
+          "}"),
+      std::pair(10, 20));
 }
 
 }  // namespace
