@@ -83,7 +83,8 @@ std::string next_step(const Findings& f) {
   if (f.held_out == HeldOut::kNoTime) return "Measure longer runs, so that predictions can be compared with them.";
   if (f.numbering.anew())
     return "Give each robot the same number in all runs, or other numbers in each run, and identify again.";
-  if (predicts_worse(f)) return "Find out what differed between the data of the fit and the held-out data.";
+  if (predicts_worse(f))
+    return "Find out whether the held-out data differ from the data of the fit, or whether an effect is false.";
   if (f.unexplained.large())
     return f.replicates
                ? "Look for the cause of what is left unexplained, in the covariates that it varies with."
@@ -334,7 +335,7 @@ std::string caveats_of(const Findings& f) {
   if (predicts_worse(f))
     sentences.push_back(fmt::format(
         "With effects the error on these data is larger than that of the base model ({:.2f} mm, {:.2f} mm), beyond "
-        "chance: they differ from the data of the fit.",
+        "chance. Either they differ from the data of the fit, or an effect is false.",
         after_mm, before_mm));
   if (has_effects && f.check.chose_on_reported)
     sentences.emplace_back(

@@ -34,14 +34,18 @@ void add_test_faults(const identify::MeasuredSet& test, std::vector<identify::Da
 identify::Identified identify_trajectories(const std::filesystem::path& train_directory,
                                            const std::filesystem::path& test_directory,
                                            const std::filesystem::path& out, const identify::Options& options) {
-  identify::MeasuredSet train = identify::load_or_import(train_directory, out / "imported-train");
+  const std::filesystem::path imported_test = out / "imported-test";
+  // A track without a number must not look like a robot of the test set.
+  const std::uint32_t first_number =
+      test_directory.empty() ? 0 : identify::first_number_beside(train_directory, test_directory, imported_test);
+  identify::MeasuredSet train = identify::load_or_import(train_directory, out / "imported-train", first_number);
   identify::demand_plausible(train, train_directory.string());
   options.progress({"checking for faults of the data", "", stats::Work::kSame});
   // No robot can produce these samples: they are excluded before the fit.
   std::vector<identify::DataFault> faults = identify::exclude_faults(train);
   std::optional<identify::MeasuredSet> test;
   if (!test_directory.empty()) {
-    test = identify::load_or_import(test_directory, out / "imported-test", train.robots().back() + 1);
+    test = identify::load_or_import(test_directory, imported_test, train.robots().back() + 1);
     identify::demand_plausible(*test, test_directory.string());
     identify::demand_longer_than(*test, options.horizon_s, false, test_directory.string());
     identify::hold_out_for_choice(train);

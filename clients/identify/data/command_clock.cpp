@@ -42,6 +42,11 @@ CommandClock::CommandClock(const Track& track, double lag_s) {
     state.previous = state.command;
     if (is_turn(state.command)) state.earlier_turn = state.command;
     if (change.motion != state.command) ++state.count;
+    if (state.first) {
+      // Commands before the start of the track collapse: the last one is the first.
+      state.earlier_turn = Motion::kStop;
+      state.count = change.motion != Motion::kStop ? 1 : 0;
+    }
     state.command = change.motion;
     state.since_s = 0;
     if (is_turn(change.motion)) state.last_turn = change.motion;

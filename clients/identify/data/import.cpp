@@ -204,11 +204,18 @@ std::set<std::string> unnumbered_runs(const std::vector<fs::path>& files) {
   return runs;
 }
 
-/// Gives each track of these runs a number that no other track has, from `next` on or above all known numbers.
-void number_tracks(MeasuredSet& set, const std::set<std::string>& runs, std::uint32_t next) {
+/// The number above all numbers of robots in other runs than these; 0 if there are none.
+std::uint32_t first_free_number(const MeasuredSet& set, const std::set<std::string>& unnumbered) {
+  std::uint32_t next = 0;
   for (const Run& run : set.runs)
     for (const Track& track : run.tracks)
-      if (!runs.contains(run.name)) next = std::max(next, track.robot + 1);
+      if (!unnumbered.contains(run.name)) next = std::max(next, track.robot + 1);
+  return next;
+}
+
+/// Gives each track of these runs a number that no other track has, from `next` on or above all known numbers.
+void number_tracks(MeasuredSet& set, const std::set<std::string>& runs, std::uint32_t next) {
+  next = std::max(next, first_free_number(set, runs));
   for (Run& run : set.runs) {
     if (!runs.contains(run.name)) continue;
     for (Track& track : run.tracks) track.robot = next++;
@@ -216,6 +223,14 @@ void number_tracks(MeasuredSet& set, const std::set<std::string>& runs, std::uin
 }
 
 }  // namespace
+
+std::uint32_t first_number_beside(const fs::path& directory, const fs::path& other, const fs::path& converted) {
+  if (unnumbered_runs(importable(directory)).empty()) return 0;
+  const std::vector<fs::path> files = importable(other);
+  if (!files.empty()) import_set(other, converted);
+  const MeasuredSet set = load_measured_set(files.empty() ? other : converted);
+  return first_free_number(set, unnumbered_runs(files));
+}
 
 MeasuredSet load_or_import(const fs::path& directory, const fs::path& converted, std::uint32_t first_number) {
   const std::vector<fs::path> files = importable(directory);

@@ -39,4 +39,10 @@ void import_set(const std::filesystem::path& from, const std::filesystem::path& 
 [[nodiscard]] MeasuredSet load_or_import(const std::filesystem::path& directory,
                                          const std::filesystem::path& converted, std::uint32_t first_number = 0);
 
+/// `first_number` of `directory`, if the set `other` is judged by a model of it: a number above those of all robots that `other`
+/// numbers; 0 if all tracks of `directory` have numbers. Converts the files of `other` into `converted`.
+[[nodiscard]] std::uint32_t first_number_beside(const std::filesystem::path& directory,
+                                                const std::filesystem::path& other,
+                                                const std::filesystem::path& converted);
+
 }  // namespace kilotwin::identify

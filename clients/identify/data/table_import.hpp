@@ -27,10 +27,10 @@ void import_tables(const std::filesystem::path& from, const std::filesystem::pat
 
 /// Whether a file is a table of `kilotwin track`.
 [[nodiscard]] bool is_track_table(const std::filesystem::path& file);
-/// `run,robot,time_s,x_mm,y_mm` rows of such a table, without a header. Headings are left out: the tracker filters them from the
-/// positions by a model without drift, so they follow the direction of motion, and are no second measurement. Without a calibration the scale follows from the
-/// radius of the discs, 16.5 mm, and the origin is the middle of what the robots visited. Robots without a number of their own are numbered by
-/// their tracks.
+/// `run,robot,time_s,x_mm,y_mm` rows of such a table, without a header. Headings are left out: the tracker filters them
+/// from the positions by a model without drift, so they follow the direction of motion, and are no second measurement.
+/// Without a calibration the scale follows from the radius of the discs, 16.5 mm, and the origin is the middle of what
+/// the robots visited. Robots without a number of their own are numbered by their tracks.
 [[nodiscard]] std::string rows_of_track_table(const std::filesystem::path& file);
 
 }  // namespace kilotwin::identify

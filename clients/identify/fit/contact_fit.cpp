@@ -60,6 +60,10 @@ void Fitter::update_walls(FitState& state) const {
 
 void Fitter::fit_walls(FitState& state) const {
   MotionModel& model = state.model;
+  std::size_t samples = 0;
+  for (const TrackView& view : state.tracks.views()) samples += view.track->samples.size();
+  // The ends of so few are chance.
+  if (samples < 100) return;
   // Largest distance between the tracked point and the disc centre.
   const double reach = std::abs(model.base.centre_mm - model.base.ahead_mm);
   // The tracked point with the camera distortion removed.
@@ -79,14 +83,15 @@ void Fitter::fit_walls(FitState& state) const {
   const std::array<Side, 4> sides = {
       Side{&Walls::x_high_mm, &Sample::x_mm, 1}, Side{&Walls::x_low_mm, &Sample::x_mm, -1},
       Side{&Walls::y_high_mm, &Sample::y_mm, 1}, Side{&Walls::y_low_mm, &Sample::y_mm, -1}};
+  // Positions of a side, mm: coarse steps from the edge of the visited places on, then fine ones about the best.
+  constexpr double kCoarse_mm = 2, kInside_mm = 2, kBeyond_mm = 4;
+  constexpr std::array<double, 4> kFine_mm = {-1.0, 1.0, -0.5, 0.5};
   Walls reached;
-  for (const Side& side : sides) {
-    // With headings, detected_walls() has found most walls already.
-    if (headings_ && std::isfinite(model.walls.*side.wall)) continue;
+  // Whether the side became a wall, by a gain of more than `least` in log likelihood.
+  const auto fit_side = [&](const Side& side, double least) {
     std::vector<double> places;
     for (const TrackView& view : state.tracks.views())
       for (const Sample& s : view.track->samples) places.push_back(side.sign * place_of(view, s).*side.along);
-    if (places.size() < 100) return;
     const double edge = stats::upper_end(places, std::max<std::size_t>(3, places.size() / 2000));
     // Its disc centre reached at least this place, whatever its heading.
     reached.*side.wall = side.sign * (edge - reach);
@@ -101,12 +106,9 @@ void Fitter::fit_walls(FitState& state) const {
       if (there > 5) near.push_back(&view);
     }
     model.walls.*side.wall = side.sign * std::numeric_limits<double>::infinity();
-    if (near.empty()) continue;
+    if (near.empty()) return false;
     MotionModel best = model;
-    // Penalty of a wall, in log likelihood: covers chance and a few outliers. Three walls make a fourth likely: then a Bayes factor
-    // of 20 is enough.
-    constexpr double kSure = 30, kLikely = 3;
-    double best_value = log_likelihood_with_contacts(model, near) + (model.walls.sides() >= 3 ? kLikely : kSure);
+    double best_value = log_likelihood_with_contacts(model, near) + least;
     const auto try_at = [&](double wall) {
       MotionModel trial = model;
       trial.walls.*side.wall = side.sign * wall;
@@ -115,12 +117,24 @@ void Fitter::fit_walls(FitState& state) const {
       best_value = value;
       best = trial;
     };
-    for (double wall = edge - 2; wall <= edge + reach + 4; wall += 2) try_at(wall);
+    for (double wall = edge - kInside_mm; wall <= edge + reach + kBeyond_mm; wall += kCoarse_mm) try_at(wall);
     const double found = side.sign * best.walls.*side.wall;
-    if (std::isinf(found)) continue;
-    for (const double by : {-1.0, 1.0, -0.5, 0.5}) try_at(found + by);
+    if (std::isinf(found)) return false;
+    for (const double by : kFine_mm) try_at(found + by);
     model = best;
+    return true;
+  };
+  // Least gain of a wall, in log likelihood: covers chance and a few outliers. Three such walls make a fourth likely: then a
+  // Bayes factor of 20 is enough, for the best of all its positions.
+  constexpr double kSure = 30, kLikely = 3;
+  const double positions = std::floor((kInside_mm + reach + kBeyond_mm) / kCoarse_mm) + 1 + kFine_mm.size();
+  std::vector<const Side*> open;
+  for (const Side& side : sides) {
+    // With headings, detected_walls() has found most walls already.
+    if (headings_ && std::isfinite(model.walls.*side.wall)) continue;
+    if (!fit_side(side, kSure)) open.push_back(&side);
   }
+  if (open.size() == 1) fit_side(*open.front(), kLikely + std::log(positions));
   add_implied_side(model.walls, reached);
 }
 

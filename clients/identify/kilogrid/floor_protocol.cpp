@@ -67,14 +67,16 @@ std::vector<const FloorRun*> FloorDays::searched() const {
 }
 
 std::size_t chosen_model(const std::vector<FloorScore>& path) {
-  // Robots of a day differ: the error of those that are predicted is larger by two standard errors with a probability of 2.3 %, by
-  // chance alone.
-  constexpr double kSameMisfit = 0.02, kSameError = 0.01, kChance = 2;
+  // Robots of a day differ: the error of those that are predicted is larger by two standard errors with a probability
+  // of 2.3 %, by chance alone. Few robots have a large standard error: a model that is worse by more than kLargest is
+  // not written, whatever the reason.
+  constexpr double kSameMisfit = 0.02, kSameError = 0.01, kLargest = 0.05, kChance = 2;
   const auto eligible = [&](std::size_t k) {
     const FloorScore &model = path[k], &base = path[0];
     // Written so that a number that is none does not pass.
-    const bool predicts =
-        model.rmse_mm <= base.rmse_mm * (1 + kSameError) || model.excess.mean_mm2 <= kChance * model.excess.se_mm2;
+    const bool by_chance =
+        model.rmse_mm <= base.rmse_mm * (1 + kLargest) && model.excess.mean_mm2 <= kChance * model.excess.se_mm2;
+    const bool predicts = model.rmse_mm <= base.rmse_mm * (1 + kSameError) || by_chance;
     return k == 0 || (model.misfit < base.misfit && predicts);
   };
   double least = INFINITY;

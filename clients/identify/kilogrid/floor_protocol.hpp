@@ -34,7 +34,8 @@ struct FloorScore {
   Excess excess = {};  ///< of that over the base model's
 };
 /// The index of the smallest model whose misfit is within 2 % of the least, the base model first. A model is never chosen over the
-/// base model if its misfit is not lower, or if it predicts cells worse: by more than 1 %, and by more than two standard errors.
+/// base model if its misfit is not lower, or if it predicts cells worse: by more than 5 %, or by more than 1 % and more
+/// than two standard errors.
 [[nodiscard]] std::size_t chosen_model(const std::vector<FloorScore>& path);
 
 /// A record of the days on which searches were reported, in a file beside the data: a day that was looked at before is no longer

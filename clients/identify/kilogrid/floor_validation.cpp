@@ -106,7 +106,9 @@ Excess excess_of(const Validation& a, const Validation& b) {
     const double d = a.by_robot[r].first - b.by_robot[r].first - mean * a.by_robot[r].second;
     spread += d * d;
   }
-  return {mean, std::sqrt(spread) / n};
+  // The mean is of the same robots. One robot says nothing about the spread: no excess passes as chance.
+  const auto robots = static_cast<double>(a.by_robot.size());
+  return {mean, robots < 2 ? 0 : std::sqrt(spread * robots / (robots - 1)) / n};
 }
 
 identification::Accuracy accuracy_of(const Validation& judged) {

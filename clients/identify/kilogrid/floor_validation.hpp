@@ -34,7 +34,7 @@ struct Predicted {
 struct Excess {
   double mean_mm2 = 0, se_mm2 = 0;
 };
-/// `a` less `b`, of the same robots and times; infinite if the robots differ.
+/// `a` less `b`, of the same robots and times; infinite if the robots differ. The standard error of one robot is 0.
 [[nodiscard]] Excess excess_of(const Validation& a, const Validation& b);
 /// rmse_mm with its 95 % interval over robots, rows, log_likelihood_per_report.
 [[nodiscard]] identification::Accuracy accuracy_of(const Validation&);

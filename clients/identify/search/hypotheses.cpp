@@ -17,7 +17,9 @@ Extent extent_of(const PreparedSet& set) {
       xs.push_back(samples[i].x_mm);
       ys.push_back(samples[i].y_mm);
     }
-    if (std::find(e.runs.begin(), e.runs.end(), view.number) == e.runs.end()) e.runs.push_back(view.number);
+    // A run that is held out whole has no value of its own: it is unknown, not zero.
+    if (!view.track->held_out && std::find(e.runs.begin(), e.runs.end(), view.number) == e.runs.end())
+      e.runs.push_back(view.number);
     const double end_s = samples.back().time_s;
     const CommandState last = view.clock->at(end_s);
     e.duration_s = std::max(e.duration_s, end_s);

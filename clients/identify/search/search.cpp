@@ -24,8 +24,8 @@
 namespace kilotwin::identify {
 namespace {
 
-/// Limits of a search: hypotheses that failed after their refit, general terms, and work (PreparedSet::work). A set of 24 robots,
-/// 3 runs and 300 s stays far below the last one.
+/// Limits of a search: hypotheses that failed after their refit, general terms, and work (PreparedSet::work). A set of
+/// 24 robots, 3 runs and 300 s stays far below the last one.
 constexpr int kMostFailed = 20, kMostGeneral = 3;
 constexpr std::uint64_t kMostWork = 3'000'000'000;
 /// Hypotheses with more alternatives (as a logarithm) than this, single steps and pulses, are no alternatives in
@@ -76,8 +76,8 @@ class Loop {
   }
 
  private:
-  /// Makes one change of the model: an addition, or at a limit and when nothing passes a removal or an exchange. Returns false
-  /// if there is none.
+  /// Makes one change of the model: an addition, or at a limit and when nothing passes a removal or an exchange.
+  /// Returns false if there is none.
   bool changed() {
     say(kTest, "testing hypotheses");
     if (limit().empty() && accept_calibration_shifts()) return true;
@@ -91,7 +91,8 @@ class Loop {
       if (!out_.limit.empty()) break;
       if (lag_explains(*best)) return true;
       if (!std::exchange(waves_tried, true) && accept_wave(best->evidence)) return true;
-      if (accepted(*best, outcome)) return true;
+      if (accepted(*best, outcome, outcome.threshold_log10_p)) return true;
+      ++failures_;
     }
     say(kAlternatives, "testing alternatives");
     return eliminate() || accept_third_covariate(outcome) || accept_general();
@@ -110,9 +111,9 @@ class Loop {
     return {};
   }
   [[nodiscard]] bool worked_out() const { return out_.fit.tracks.work() >= kMostWork; }
-  /// Adds a hypothesis that passed. Returns false, with the state as before, if the likelihood does not rise by a part of the
-  /// predicted gain.
-  bool accepted(const Finding& best, const ScoreTest::Outcome& outcome) {
+  /// Adds a hypothesis whose p fell below `threshold_log10_p`. Returns false, with the state as before, if the likelihood
+  /// does not rise by a part of the predicted gain.
+  bool accepted(const Finding& best, const ScoreTest::Outcome& outcome, double threshold_log10_p) {
     constexpr double kLeastRise = 3;
     const Search before = out_;
     const std::string name = hypothesis(best).name;
@@ -121,12 +122,11 @@ class Loop {
     note_ambiguous(best, outcome);
     if (replaced_by_alternative(name)) return true;
     note_alternatives(best, outcome);
-    add(best, outcome.threshold_log10_p);
+    add(best, threshold_log10_p);
     // Negated, so that a likelihood that is no number fails.
     if (!(fitter_.log_likelihood_of_all(out_.fit) >= likelihood + kLeastRise)) {
       out_ = before;
       failed_.insert(name);
-      ++failures_;
       return false;
     }
     eliminate_earlier();
@@ -260,7 +260,8 @@ class Loop {
     if (ranked.size() > kMostTries) ranked.resize(kMostTries);
     return ranked;
   }
-  /// Adds a term. Returns false, with the state as before, if the likelihood does not rise. `key`: among the failed hypotheses.
+  /// Adds a term. Returns false, with the state as before, if the likelihood does not rise. `key`: among the failed
+  /// hypotheses.
   bool fits(GeneralTerm one, const std::string& key) {
     constexpr double kLeastRise = 3;
     const Search before = out_;
@@ -296,13 +297,14 @@ class Loop {
     say(kAddition, "fitting " + wave.term.name);
     return fits(std::move(wave), kWave);
   }
-  /// Adds an amplitude of an accepted product over a third covariate. This is a question of the form: it need not pass the threshold of a
-  /// new effect, which rises with all that the product leaves unexplained. It has to explain a large share instead, because smaller
-  /// ones come from errors of the product's own form. Returns whether there is one that fits.
+  /// Adds an amplitude of an accepted product over a third covariate. This is a question of the form: it need not pass
+  /// the threshold of a new effect, which rises with all that the product leaves unexplained. It has to explain a large
+  /// share instead, because smaller ones come from errors of the product's own form. Failures count apart: they say
+  /// nothing about new effects. Returns whether there is one that fits.
   bool accept_third_covariate(const ScoreTest::Outcome& outcome) {
     constexpr double kLeastNats = 10, kLeastShare = 0.1, kLeastHeldOut = 2, kMostLog10P = -3;
     const double least = std::max(kLeastNats, kLeastShare * explained());
-    while (limit().empty()) {
+    while (limit().empty() && failed_thirds_ < kMostFailed) {
       std::optional<Finding> best;
       for (const Finding& f : outcome.findings) {
         const Hypothesis& h = hypothesis(f);
@@ -316,7 +318,8 @@ class Loop {
         best = own;
       }
       if (!best) return false;
-      if (accepted(*best, outcome)) return true;
+      if (accepted(*best, outcome, kMostLog10P)) return true;
+      ++failed_thirds_;
     }
     return false;
   }
@@ -420,7 +423,12 @@ class Loop {
   bool merged() {
     const std::optional<std::size_t> curve = merge_amplitudes(fitter_, out_.fit);
     if (!curve) return false;
-    out_.reasons.back().finding.evidence += out_.reasons[*curve].finding.evidence;
+    const Reason& of_curve = out_.reasons[*curve];
+    Reason& of_both = out_.reasons.back();
+    of_both.finding.evidence += of_curve.finding.evidence;
+    // The curve passed the threshold of a new effect. Amplitudes over a third covariate need not.
+    of_both.finding.log10_p = std::min(of_both.finding.log10_p, of_curve.finding.log10_p);
+    of_both.threshold_log10_p = of_curve.threshold_log10_p;
     out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(*curve));
     return true;
   }
@@ -651,6 +659,7 @@ class Loop {
   Alternatives alternatives_;
   std::set<std::string> failed_;  ///< hypotheses that failed after the refit
   int eliminations_ = 0, round_ = 0, failures_ = 0;
+  int failed_thirds_ = 0;     ///< failed amplitudes over a third covariate
   bool starts_anew_ = false;  ///< with a lag
 };
 

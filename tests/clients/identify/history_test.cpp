@@ -66,6 +66,15 @@ TEST(History, TheEarlierTurnIsBeforeThePresentCommand) {
   }
 }
 
+TEST(History, CommandsBeforeTheTrackAreOne) {
+  const CommandClock clock(commanded({{-9, Motion::kLeft}, {-5, Motion::kStop}, {-1, Motion::kStraight}}));
+  const CommandState state = clock.at(1);
+  EXPECT_EQ(state.command, Motion::kStraight);
+  EXPECT_EQ(state.earlier_turn, Motion::kStop);
+  EXPECT_EQ(state.count, 1);
+  EXPECT_TRUE(state.first);
+}
+
 TEST(History, ARestResetsTheTimeSinceIt) {
   const CommandClock clock(
       commanded({{1, Motion::kStraight}, {4.5, Motion::kLeft}, {6, Motion::kStop}, {9, Motion::kRight}}));

@@ -147,6 +147,19 @@ TEST_F(ImportTest, TracksWithoutRobotsAreOtherRobotsInEachFilm) {
   EXPECT_EQ(load_or_import(folder_ / "from", folder_ / "to", 7).robots(), (std::vector<std::uint32_t>{12}));
 }
 
+TEST_F(ImportTest, TracksWithoutRobotsAreNoRobotsOfANumberedTestSet) {
+  give("film.csv", "frame,time_s,track,x_px,y_px,radius_px,heading_rad,led\n0,0,0,100,50,11,nan,off\n");
+  const fs::path test = folder_ / "test";
+  fs::create_directories(test);
+  os::write_file(test / "trajectories.csv", "run,robot,time_s,x_mm,y_mm\na,0,0,1,2\na,5,0,30,2\n");
+  const std::uint32_t first = first_number_beside(folder_ / "from", test, folder_ / "converted");
+  EXPECT_EQ(first, 6U);
+  EXPECT_EQ(load_or_import(folder_ / "from", folder_ / "to", first).robots(), (std::vector<std::uint32_t>{6}));
+  EXPECT_EQ(first_number_beside(folder_ / "from", folder_ / "from", folder_ / "converted"), 0U)
+      << "the test set numbers none";
+  EXPECT_EQ(first_number_beside(test, test, folder_ / "converted"), 0U) << "all tracks have numbers";
+}
+
 TEST_F(ImportTest, RecordingsWithHeadingsAndCommands) {
   give("seed-1.csv",
        "time_s,robot,x_mm,y_mm,heading_rad,led\n0.0000,0,1.5,-2.25,0.5,003\n1.0000,0,2.5,-2.25,0.5,000\n");

@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "clients/identify/search/hypotheses.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -34,6 +36,22 @@ TEST(RunAmplitude, ATrainingRunKeepsItsAmplitude) {
   ASSERT_EQ(amplitude.models().size(), 1u);
   EXPECT_DOUBLE_EQ(gain_of(amplitude.models()[0], 1), 0.2);
   EXPECT_EQ(RunAmplitude(MotionModel{}, 7).models().size(), 1u);
+}
+
+TEST(RunAmplitude, ARunThatIsHeldOutIsUnknown) {
+  MeasuredSet set;
+  for (int r = 0; r < 3; ++r) {
+    Track& track = set.runs.emplace_back().tracks.emplace_back();
+    track.held_out = r == 1;
+    track.commands.push_back({-1e300, Motion::kStraight});
+    for (int i = 0; i < 20; ++i) track.samples.push_back({0.5 * i, 5.0 * i, 0, 0});
+  }
+  const Extent extent = extent_of(PreparedSet(set));
+  EXPECT_EQ(extent.runs, (std::vector<std::uint32_t>{0, 2}));
+  MotionModel model = with_speeds_of_runs({0.1, 0.2});
+  model.terms[0].blocks[0].basis.factors[0].points.assign(extent.runs.begin(), extent.runs.end());
+  EXPECT_EQ(RunAmplitude(model, 1).models().size(), 13u) << "inferred from its past";
+  EXPECT_EQ(RunAmplitude(model, 2).models().size(), 1u);
 }
 
 TEST(RunAmplitude, ThePriorIsTheMeanOfAllRuns) {

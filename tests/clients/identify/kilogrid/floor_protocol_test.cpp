@@ -77,6 +77,7 @@ TEST(FloorProtocol, AModelThatPredictsWorseThanTheBaseIsNotChosen) {
   EXPECT_EQ(chosen_model({{100, 80}, {60, 95, worse(2625)}}), 0U) << "cells are predicted worse";
   EXPECT_EQ(chosen_model({{100, 80}, {60, 82, {324, 200}}}), 1U) << "by 2.5 %, but within chance";
   EXPECT_EQ(chosen_model({{100, 80}, {60, 82, {324, 50}}}), 0U) << "by 2.5 %, beyond chance";
+  EXPECT_EQ(chosen_model({{100, 80}, {60, 85, {825, 5000}}}), 0U) << "by 6 %, whatever the standard error";
   EXPECT_EQ(chosen_model({{100, 80}, {60, 80.4, {64, 5}}}), 1U) << "beyond chance, but by 0.5 %";
   EXPECT_EQ(chosen_model({{100, 80}, {std::nan(""), 70, worse(-1500)}}), 0U);
   EXPECT_EQ(chosen_model({{100, 80}, {60, std::nan(""), {std::nan(""), 5}}}), 0U);
@@ -100,7 +101,7 @@ TEST(FloorProtocol, TheExcessOfAnErrorIsOfPairedRobots) {
   base.by_robot[2].first += 20, base.by_robot[1].first += 20, base.sum += 40;
   const Excess one = excess_of(model, base);
   EXPECT_NEAR(one.mean_mm2, 1.0 / 3, 1e-9);
-  EXPECT_NEAR(one.se_mm2, std::sqrt(4.0 / 9 + 1.0 / 9 + 1.0 / 9) / 3, 1e-9);
+  EXPECT_NEAR(one.se_mm2, std::sqrt((4.0 / 9 + 1.0 / 9 + 1.0 / 9) * 3 / 2) / 3, 1e-9);
   base.by_robot.pop_back();
   EXPECT_EQ(excess_of(model, base).mean_mm2, INFINITY) << "other robots";
 }
