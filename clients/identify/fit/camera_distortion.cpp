@@ -79,7 +79,8 @@ void Fitter::choose_camera_scale(FitState& state) const {
   // Prior: the speeds and the wheel base of the ARGoS paper, independent normal. The exponent is quadratic in the
   // factor.
   const BaseParameters defaults;
-  const BasePrior prior = prior_beside(model);
+  constexpr double kByEffects = 0.5;  // of a careless laboratory
+  const BasePrior prior = prior_beside(model, kByEffects);
   double by_seed = 0, precision = 0;
   for (const auto& [value, expected, sd] :
        {std::array{model.base.straight_mm_s, defaults.straight_mm_s, prior.straight_mm_s},

@@ -74,8 +74,8 @@ class Fitter {
   static constexpr std::size_t kEnoughSamples = 8000;  ///< for noise and contact noise
 
   /// The prior of the base parameters beside the model's terms. Its speeds are nominal ones. The curve of an effect on the speed
-  /// leaves open at which values of its covariate they hold.
-  [[nodiscard]] BasePrior prior_beside(const MotionModel&) const;
+  /// leaves open at which values of its covariate they hold: `by_effects` is the standard deviation of the speed there, relative.
+  [[nodiscard]] BasePrior prior_beside(const MotionModel&, double by_effects) const;
   /// One damped Gauss-Newton step in everything but the noise.
   void step(FitState&) const;
   /// Fits a map of camera distortion without information from contacts. Under distortion walls are not straight,
