@@ -275,12 +275,6 @@ bool rescale(MotionModel& model, double factor) {
           term.coefficients.segment(first, n) *= factor;
           term.precision.segment(first, n) /= factor * factor;
           break;
-        // The scale acts on a longer position, beside linear columns that shrink it. This is exact if the middle of the map is
-        // the origin.
-        case Target::kMeasuredScale:
-          term.coefficients.segment(first, n) /= factor;
-          term.precision.segment(first, n) *= factor * factor;
-          break;
         default: break;
       }
       first += n;

@@ -55,11 +55,11 @@ class ScaleConstraint {
 [[nodiscard]] Walls carried(const Walls&, const MotionModel& before, const MotionModel& after);
 
 /// Scales all lengths in the world by `factor` about the middle of the camera map, and leaves the image unchanged.
-/// False, without a change, if the model has no camera map that can compensate for it. With a scale of the picture per
-/// place, the image stays exactly if that middle is the origin.
+/// False, without a change, if the model has no camera map that can compensate for it.
 bool rescale(MotionModel&, double factor);
 /// Derivative of the logarithm of the camera scale by each coefficient of all terms, in order. Empty if the model
-/// has no such map. Only linear columns count: a scale of the picture per place has no constant.
+/// has no such map.
+/// it has no such map.
 [[nodiscard]] Eigen::VectorXd log_scale_by_coefficients(const MotionModel&);
 
 }  // namespace kilotwin::identify

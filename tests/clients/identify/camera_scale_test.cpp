@@ -91,35 +91,6 @@ TEST(CameraScale, AllLengthsScaleTogether) {
   }
 }
 
-TEST(CameraScale, AScaleOfThePictureScalesWithAllLengths) {
-  MotionModel model = bent();
-  Term& term = model.terms.front();
-  // The middle of the map is the origin.
-  for (Block& block : term.blocks) {
-    Factor& plane = block.basis.factors.front();
-    plane.low = plane.and_low = -500;
-    plane.high = plane.and_high = 500;
-  }
-  term.blocks.push_back({Target::kMeasuredScale, term.blocks.front().basis, kAlways});
-  term.coefficients.conservativeResize(27);
-  term.coefficients.tail(9) = Eigen::VectorXd::LinSpaced(9, -0.04, 0.05);
-  term.precision = Eigen::VectorXd::Ones(27);
-  // The tracked point is the drive's reference point and the disc centre, so that poses are measured positions.
-  model.base.ahead_mm = model.base.centre_mm = 0;
-  MotionModel larger = model;
-  ASSERT_TRUE(rescale(larger, 1.06));
-  for (const double x : {-350.0, 20.0, 300.0}) {
-    for (const double y : {-280.0, 130.0}) {
-      const Eigen::Vector3d before = model.measured(x, y, 0, {}),
-                            after = larger.measured(1.06 * x, 1.06 * y, 0, {});
-      EXPECT_NEAR(after[0], before[0], 1e-9);
-      EXPECT_NEAR(after[1], before[1], 1e-9);
-    }
-  }
-  // The prior of the scale follows its size.
-  EXPECT_NEAR(larger.terms.front().precision[20], 1.06 * 1.06, 1e-12);
-}
-
 TEST(CameraScale, WithoutAMapNothingIsScaled) {
   MotionModel model;
   EXPECT_FALSE(rescale(model, 1.1));
