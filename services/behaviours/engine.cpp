@@ -475,6 +475,10 @@ Executor::Main BehavioursEngine::run_loops(std::uint32_t i, const Executor& exec
     all_calls += calls;
     cycles = main.left;
     const bool unchanged = calls == 1 && robot.returned == KT_RETURNED_UNCHANGED;
+    if (unchanged && compares_unchanged_) {
+      ++unchanged_calls_.compared;
+      if (!memory.settles(span.program, span.slot, executor.data_octets(), thread)) ++unchanged_calls_.differing;
+    }
     if (robot.spent == 0 && exchange.log_length == printed &&
         (unchanged || memory.settles(span.program, span.slot, executor.data_octets(), thread))) {
       span.kept = true;

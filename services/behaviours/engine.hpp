@@ -119,6 +119,14 @@ class BehavioursEngine {
   /// Voltage of the battery of robot `id` of this host, V. Requires that the experiment has batteries.
   [[nodiscard]] double battery_V(std::uint32_t id) const { return senses_.battery_V(id - share_.first); }
 
+  /// Calls of loop() after which a program said that it had written nothing.
+  struct UnchangedCalls {
+    std::uint64_t compared = 0, differing = 0;
+  };
+  /// From now on compares the memory after each such call, which is otherwise trusted. For tests; results stay as they are.
+  void compare_unchanged_calls() { compares_unchanged_ = true; }
+  [[nodiscard]] const UnchangedCalls& unchanged_calls() const { return unchanged_calls_; }
+
   /// Octets that the memories of all robots occupy.
   [[nodiscard]] std::uint64_t memory_octets() const;
 
@@ -218,6 +226,8 @@ class BehavioursEngine {
   };
   std::vector<LoopProbe> probes_;     ///< per program: whether a further call of loop() in a tick changes its state
   std::vector<std::uint8_t> warned_;  ///< per program: Warning bits of what was reported
+  bool compares_unchanged_ = false;
+  UnchangedCalls unchanged_calls_;
 
   Running own_running_;
   Running* running_ = &own_running_;

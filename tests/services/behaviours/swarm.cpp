@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <stdexcept>
 
 #include "core/os/files.hpp"
 #include "idl/manifest.pb.h"
@@ -122,6 +123,7 @@ Swarm::Swarm(const std::vector<std::string>& texts, std::uint32_t robots, std::u
   programs = ProgramSet::load(*plan, folder.path());
   for (std::uint32_t h = 0; h < host_count; ++h) {
     hosts.push_back(std::make_unique<BehavioursEngine>(*plan, HostId{h}, programs));
+    hosts.back()->compare_unchanged_calls();
   }
 }
 
@@ -130,8 +132,12 @@ void Swarm::step(const Air& air) {
   const BodyFrame* const all[] = {&bodies};
   SwarmView view(plan->robots(), plan->movables(), plan->memory.size());
   view.gather(tick, all);
-  for (std::uint32_t h = 0; h < hosts.size(); ++h)
+  for (std::uint32_t h = 0; h < hosts.size(); ++h) {
     hosts[h]->step(tick, air.frame(tick, plan->share(HostId{h})), &view);
+    if (hosts[h]->unchanged_calls().differing != 0)
+      throw std::logic_error(
+          "a call of loop() changed the state, but the program's count of writes says that it did not");
+  }
   ++tick;
 }
 

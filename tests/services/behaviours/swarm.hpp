@@ -70,7 +70,7 @@ class Swarm {
   Swarm(const std::vector<std::string>& programs, std::uint32_t robots, std::uint32_t hosts = 1,
         const std::string& experiment = "", const std::function<void(proto::Manifest&)>& edit = {});
 
-  /// One tick of all hosts.
+  /// One tick of all hosts. Throws if a call of loop() changed the state and the program's count of writes says that it did not.
   void step(const Air& air = {});
   /// Delivers RUN to all robots and lets them start.
   void start();
