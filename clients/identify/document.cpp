@@ -91,8 +91,7 @@ std::string next_step(const Findings& f) {
                : "Repeat the commands of one run, so that repetitions show how much can be explained at all.";
   if (!f.check.dropped.empty())
     return "Record more runs: they show whether an effect that was not written held in the data of the fit only, "
-           "stood for "
-           "another one, or was chance.";
+           "stood for another one, or was chance.";
   if (!f.found.ambiguous.empty()) {
     const Ambiguity& a = f.found.ambiguous.front();
     return fmt::format("To tell {} from {}: {}.", a.found, a.instead,

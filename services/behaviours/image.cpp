@@ -115,9 +115,8 @@ std::shared_ptr<Program> Program::load(ElfFile file, const std::string& name, co
   // The tests of the cycle budget: cycle_counters.cpp.
   if (!__builtin_cpu_supports("sse4.1"))
     throw RunError(
-        "robots' programs need a processor with SSE4.1, and this one has none; a virtual machine may hide it: give "
-        "it the "
-        "processor of its host");
+        "robots' programs need a processor with SSE4.1, and this one has none; a virtual machine may hide it: "
+        "give it the processor of its host");
   const std::lock_guard lock(registry().mutex);
   auto entry = registry().programs.find(address);
   if (entry == registry().programs.end()) {
