@@ -2,9 +2,13 @@
 // removes the distortion.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "clients/identify/fit/fitter.hpp"
+#include "clients/identify/search/central_distortion.hpp"
+#include "clients/identify/search/shape_refinement.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin::identify {
@@ -13,14 +17,22 @@ namespace {
 constexpr double kWide_mm = 220, kHigh_mm = 180;  ///< half the sides of the area of disc centres
 constexpr double kBarrel = 0.15;
 
-/// Shrinks the image by `bent` at the corners.
-Eigen::Vector2d seen(double x_mm, double y_mm, double bent) {
-  const double square = (x_mm * x_mm + y_mm * y_mm) / (kWide_mm * kWide_mm + kHigh_mm * kHigh_mm);
-  return (1 - bent * square) * Eigen::Vector2d(x_mm, y_mm);
+/// The place at which a point of the floor is seen.
+using Picture = std::function<Eigen::Vector2d(double x_mm, double y_mm)>;
+
+/// Shrinks the image by `bent` at the corners, with an even power of the distance from its middle.
+Picture lens(double bent, int power = 2) {
+  return [bent, power](double x_mm, double y_mm) -> Eigen::Vector2d {
+    const double square = (x_mm * x_mm + y_mm * y_mm) / (kWide_mm * kWide_mm + kHigh_mm * kHigh_mm);
+    return (1 - bent * std::pow(square, power / 2)) * Eigen::Vector2d(x_mm, y_mm);
+  };
 }
 
-/// Robots without mutual collisions between walls, simulated with arcs of 50 ms, seen through a lens.
-MeasuredSet behind_walls(double bent) {
+/// Moves rows of the picture sideways, which no scale about a centre does.
+Eigen::Vector2d sheared(double x_mm, double y_mm) { return {x_mm + 12 * std::sin(y_mm / 60), y_mm}; }
+
+/// Robots without mutual collisions between walls, simulated with arcs of 50 ms, seen through a camera.
+MeasuredSet behind_walls(const Picture& seen) {
   const Random random(21);
   const double dt = 0.05, factor_s = 0.001, tracker_mm = 0.3, tracker_rad = 0.03, duration_s = 150;
   MeasuredSet set;
@@ -35,7 +47,7 @@ MeasuredSet behind_walls(double bent) {
       const double t = k * dt;
       const auto noise = [&](Stream stream, std::uint32_t draw) { return random.normal(stream, r, Tick{k}, draw); };
       if (k % 10 == 0) {
-        const Eigen::Vector2d at = seen(x, y, bent);
+        const Eigen::Vector2d at = seen(x, y);
         track.samples.push_back({t, at[0] + tracker_mm * noise(Stream::kMeasurementNoise, 0),
                                  at[1] + tracker_mm * noise(Stream::kMeasurementNoise, 1),
                                  wrapped_angle(heading + tracker_rad * noise(Stream::kMeasurementNoise, 2))});
@@ -82,7 +94,7 @@ Term camera_map() {
 }
 
 TEST(CameraDistortion, WallsAreCertainWithoutDistortion) {
-  const MeasuredSet set = behind_walls(0);
+  const MeasuredSet set = behind_walls(lens(0));
   const Fitter fitter(set, 2);
   FitState state(set);
   MotionModel& model = state.model;
@@ -98,7 +110,7 @@ TEST(CameraDistortion, WallsAreCertainWithoutDistortion) {
 }
 
 TEST(CameraDistortion, WallsAreUncertainUntilAMapRemovesTheDistortion) {
-  const MeasuredSet set = behind_walls(kBarrel);
+  const MeasuredSet set = behind_walls(lens(kBarrel));
   const Fitter fitter(set, 2);
   FitState state(set);
   MotionModel& model = state.model;
@@ -111,6 +123,43 @@ TEST(CameraDistortion, WallsAreUncertainUntilAMapRemovesTheDistortion) {
   EXPECT_NEAR((model.walls.x_high_mm - model.walls.x_low_mm) / (model.walls.y_high_mm - model.walls.y_low_mm),
               kWide_mm / kHigh_mm, 0.02);
   EXPECT_NEAR(model.walls.x_high_mm - model.walls.x_low_mm, 2 * kWide_mm, 20);
+}
+
+/// A model with a refined map of a picture, before and after the form of a lens was tried.
+struct Fits {
+  FitState free, central;
+  double evidence_free = 0, evidence_central = 0;
+};
+Fits fits_of(const MeasuredSet& set) {
+  const Fitter fitter(set, 2);
+  FitState state(set);
+  fitter.fit_base(state);
+  state.model.terms.push_back(camera_map());
+  fitter.fit(state, 2);
+  refine_curves(fitter, state, 0);
+  Fits out{state, state, fitter.log_evidence(state), 0};
+  fit_central_distortion(fitter, out.central, 0);
+  out.evidence_central = fitter.log_evidence(out.central);
+  return out;
+}
+bool has_scale(const FitState& state) {
+  const std::vector<Block>& blocks = state.model.terms.front().blocks;
+  return std::any_of(blocks.begin(), blocks.end(),
+                     [](const Block& block) { return block.target == Target::kMeasuredScale; });
+}
+
+TEST(CameraDistortion, ALensBecomesAScaleOfThePicture) {
+  // A map of low order holds a lens of the second power. This one is of the fourth.
+  const Fits fits = fits_of(behind_walls(lens(kBarrel, 4)));
+  EXPECT_FALSE(has_scale(fits.free));
+  EXPECT_TRUE(has_scale(fits.central));
+  EXPECT_GT(fits.evidence_central, fits.evidence_free);
+}
+
+TEST(CameraDistortion, APictureThatNoScaleExplainsKeepsItsMap) {
+  const Fits fits = fits_of(behind_walls(sheared));
+  EXPECT_FALSE(has_scale(fits.central));
+  EXPECT_EQ(fits.evidence_central, fits.evidence_free);
 }
 
 }  // namespace
