@@ -24,6 +24,7 @@ std::pair<std::string, std::string> covariate_words(Covariate covariate) {
     case Covariate::kMotorTime:
     case Covariate::kLeftMotorTime:
     case Covariate::kRightMotorTime:
+    case Covariate::kMotorTimeSum:
     case Covariate::kDrivenTime: return {"motor-time", "motor_time"};
     case Covariate::kNeighbours:
     case Covariate::kNearest:

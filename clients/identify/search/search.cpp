@@ -14,12 +14,14 @@
 #include "clients/identify/search/central_distortion.hpp"
 #include "clients/identify/search/change_points.hpp"
 #include "clients/identify/search/neighbour_shape.hpp"
+#include "clients/identify/search/parallax.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
 #include "clients/identify/search/simplification.hpp"
 #include "clients/identify/search/target_extension.hpp"
 #include "clients/identify/search/total_variation_map.hpp"
 #include "clients/identify/search/traffic_shape.hpp"
 #include "clients/identify/search/travelling_waves.hpp"
+#include "clients/identify/search/wheel_offsets.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -70,7 +72,12 @@ class Loop {
       ++round_;
       note_stage();
     }
-    for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t) simplify(fitter_, out_.fit, t);
+    for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t) {
+      simplify(fitter_, out_.fit, t);
+      if (!is_constant_drift(out_.fit.model.terms[t])) continue;
+      out_.fit.model.terms[t].name = "drift";
+      out_.reasons[t].covariates = {"world_frame"};
+    }
     out_.work = out_.fit.tracks.work();
     return std::move(out_);
   }
@@ -437,13 +444,14 @@ class Loop {
   void refine_shape(std::size_t place) {
     if (out_.fit.model.terms[place].general) {
       refit(fitter_, out_.fit, place);
-      simplify_to_switch(fitter_, out_.fit, place);
+      became_switch(place);
       return;
     }
     if (!refine_neighbour_shape(fitter_, out_.fit, place) && !refine_traffic_shape(fitter_, out_.fit, place))
       refine_curves(fitter_, out_.fit, place);
     // Smooth curves leave residuals of a switch, which would pass the tests as one further term after another.
-    if (simplify_to_switch(fitter_, out_.fit, place)) return;
+    if (became_switch(place)) return;
+    if (fit_camera_foot(fitter_, out_.fit, place)) return;
     const std::string before = out_.fit.model.terms[place].name;
     if (refine_wave_numbers(fitter_, out_.fit, place)) refit(fitter_, out_.fit, place);
     const std::string name = find_change_points(fitter_, out_.fit, place);
@@ -457,6 +465,13 @@ class Loop {
     fit_total_variation_map(fitter_, out_.fit, place);
     fit_central_distortion(fitter_, out_.fit, place);
     extend_targets(fitter_, out_.fit, place);
+  }
+  /// Replaces curves per robot or command by amplitudes from an instant on, and these by a change of each wheel, if the evidence
+  /// rises. Returns whether there is an instant.
+  bool became_switch(std::size_t place) {
+    if (!simplify_to_switch(fitter_, out_.fit, place)) return false;
+    if (replace_by_wheel_offsets(fitter_, out_.fit, place)) out_.reasons[place].acts_on = "speed of each wheel";
+    return true;
   }
   /// Tests camera motion against a drift of the robots. Robots at rest and walls separate the two.
   void try_camera_motion() {
