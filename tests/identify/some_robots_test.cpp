@@ -1,10 +1,9 @@
-// Effects of some robots only, on small scenes: neighbours that count, wheels that change, robots of another height.
+// Effects of some robots only, on small scenes: neighbours that count, wheels that change.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <optional>
 
-#include "clients/identify/search/parallax.hpp"
 #include "clients/identify/search/search.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
 #include "clients/identify/search/simplification.hpp"
@@ -102,28 +101,6 @@ TEST(WheelOffsets, OfRobotsThatAreReplaced) {
   EXPECT_NEAR(change_mm_s(5).first, 2.6, 0.6);
   EXPECT_NEAR(change_mm_s(5).second, -2.4, 0.6);
   EXPECT_NEAR(change_mm_s(1).first, 0, 0.4);
-}
-
-TEST(Parallax, IsAboutTheFootOfTheCamera) {
-  const truth::Scene scene = small({truth::parallax()});
-  const MeasuredSet set = set_of(scene, played(scene));
-  FitState state(set);
-  const Fitter fitter(set, 2);
-  fitter.fit_base(state);
-  state.model.terms.push_back(term_of({identify::dictionary_of(identify::extent_of(state.tracks))},
-                                      "camera-by-robot", Target::kMeasuredScale));
-  ASSERT_FALSE(state.model.terms.front().blocks.empty());
-  fitter.fit(state, 2);
-  identify::refit(fitter, state, 0);
-  ASSERT_TRUE(identify::fit_camera_foot(fitter, state, 0));
-  // The tall robots against the others: a point and its distance from the foot.
-  const auto seen = [&](std::uint32_t robot) {
-    identify::Situation s;
-    s.robot = robot;
-    return state.model.measured(250, 200, 0, s);
-  };
-  EXPECT_NEAR(seen(3)[0] - seen(1)[0], 0.06 * (250 + state.model.base.ahead_mm - 150), 4);
-  EXPECT_NEAR(seen(3)[1] - seen(1)[1], 0.06 * (200 + 100), 4);
 }
 
 }  // namespace

@@ -25,9 +25,6 @@ void add_robot_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   const auto ahead = make.put(Target::kMeasuredAhead, each, kAlways),
              left = make.put(Target::kMeasuredLeft, each, kAlways);
   make.add("camera-by-robot", {"measurement", "robot"}, kCamera.in_words, some({ahead, left}, 0, n));
-  // Robots of another height under a low camera.
-  make.add("camera-by-robot", {"measurement", "robot"}, kCamera.in_words,
-           some({make.put(Target::kMeasuredScale, each, kAlways)}, 0, n));
 }
 
 void add_run_hypotheses(DictionaryBuilder& make, const Extent& extent) {

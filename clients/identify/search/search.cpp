@@ -14,7 +14,6 @@
 #include "clients/identify/search/central_distortion.hpp"
 #include "clients/identify/search/change_points.hpp"
 #include "clients/identify/search/neighbour_shape.hpp"
-#include "clients/identify/search/parallax.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
 #include "clients/identify/search/simplification.hpp"
 #include "clients/identify/search/target_extension.hpp"
@@ -102,7 +101,7 @@ class Loop {
       ++failures_;
     }
     say(kAlternatives, "testing alternatives");
-    return eliminate() || accept_third_covariate(outcome) || accept_general();
+    return eliminate() || accept_general();
   }
   /// The limit that the search has reached, in one sentence; empty: none. It then adds nothing more.
   [[nodiscard]] std::string limit() const {
@@ -181,15 +180,10 @@ class Loop {
       if (!good(f, outcome.threshold_log10_p) || f.evidence < least_evidence ||
           failed_.contains(hypothesis(f).name))
         continue;
-      if (multiplies_product(hypothesis(f))) continue;
       if (of_robots_and_more(hypothesis(f)) && parts_evidence(hypothesis(f), outcome) > f.evidence) continue;
       if (best == nullptr || f.evidence > best->evidence) best = &f;
     }
     return best;
-  }
-  /// Whether a hypothesis is an amplitude of an accepted product: accept_third_covariate().
-  [[nodiscard]] bool multiplies_product(const Hypothesis& h) const {
-    return h.covariates.size() > 2 && identify::multiplies_product(dictionary_.term_of(h, 1));
   }
   static bool of_robots_and_more(const Hypothesis& h) {
     return h.covariates.size() == 2 &&
@@ -304,32 +298,6 @@ class Loop {
     say(kAddition, "fitting " + wave.term.name);
     return fits(std::move(wave), kWave);
   }
-  /// Adds an amplitude of an accepted product over a third covariate. This is a question of the form: it need not pass
-  /// the threshold of a new effect, which rises with all that the product leaves unexplained. It has to explain a large
-  /// share instead, because smaller ones come from errors of the product's own form. Failures count apart: they say
-  /// nothing about new effects. Returns whether there is one that fits.
-  bool accept_third_covariate(const ScoreTest::Outcome& outcome) {
-    constexpr double kLeastNats = 10, kLeastShare = 0.1, kLeastHeldOut = 2, kMostLog10P = -3;
-    const double least = std::max(kLeastNats, kLeastShare * explained());
-    while (limit().empty() && failed_thirds_ < kMostFailed) {
-      std::optional<Finding> best;
-      for (const Finding& f : outcome.findings) {
-        const Hypothesis& h = hypothesis(f);
-        if (f.log10_p > kMostLog10P || failed_.contains(h.name) || !multiplies_product(h)) continue;
-        Finding own = score_test_->evidence_of(h, -1);
-        if (own.evidence < least || own.held_out < kLeastHeldOut || (best && own.evidence <= best->evidence))
-          continue;
-        own.hypothesis = f.hypothesis;
-        own.statistic = f.statistic;
-        own.log10_p = f.log10_p;
-        best = own;
-      }
-      if (!best) return false;
-      if (accepted(*best, outcome, kMostLog10P)) return true;
-      ++failed_thirds_;
-    }
-    return false;
-  }
   /// Adds the general term with the most evidence that fits, if much is left unexplained. Returns whether there is one.
   bool accept_general() {
     if (general_terms_ == kMostGeneral || !limit().empty() || !leaves_much_) return false;
@@ -433,7 +401,6 @@ class Loop {
     const Reason& of_curve = out_.reasons[*curve];
     Reason& of_both = out_.reasons.back();
     of_both.finding.evidence += of_curve.finding.evidence;
-    // The curve passed the threshold of a new effect. Amplitudes over a third covariate need not.
     of_both.finding.log10_p = std::min(of_both.finding.log10_p, of_curve.finding.log10_p);
     of_both.threshold_log10_p = of_curve.threshold_log10_p;
     out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(*curve));
@@ -451,7 +418,6 @@ class Loop {
       refine_curves(fitter_, out_.fit, place);
     // Smooth curves leave residuals of a switch, which would pass the tests as one further term after another.
     if (became_switch(place)) return;
-    if (fit_camera_foot(fitter_, out_.fit, place)) return;
     const std::string before = out_.fit.model.terms[place].name;
     if (refine_wave_numbers(fitter_, out_.fit, place)) refit(fitter_, out_.fit, place);
     const std::string name = find_change_points(fitter_, out_.fit, place);
@@ -674,7 +640,6 @@ class Loop {
   Alternatives alternatives_;
   std::set<std::string> failed_;  ///< hypotheses that failed after the refit
   int eliminations_ = 0, round_ = 0, failures_ = 0;
-  int failed_thirds_ = 0;     ///< failed amplitudes over a third covariate
   bool starts_anew_ = false;  ///< with a lag
 };
 
