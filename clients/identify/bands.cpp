@@ -23,6 +23,7 @@ struct Place {
 /// A situation with a value of one covariate; nothing for covariates that depend on the other robots or on decayed time.
 std::optional<Situation> situation_at(const Axis& axis, double value) {
   Situation s;
+  if (is_of_some(axis)) return std::nullopt;
   switch (axis.of) {
     case Covariate::kTime: s.time_s = value; return s;
     case Covariate::kX: s.x_mm = value; return s;
@@ -41,6 +42,7 @@ std::optional<Situation> situation_at(const Axis& axis, double value) {
       s.commands.motor_s = {value, value};
       s.commands.driven_s = value;
       return s;
+    case Covariate::kMotorTimeSum: s.commands.motor_s = {0, value}; return s;
     default: return std::nullopt;
   }
 }

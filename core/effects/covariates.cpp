@@ -54,9 +54,12 @@ Covariate of_wheel(Covariate covariate, std::uint32_t wheel) {
 Covariates::Covariates(const RunPlan& plan) : plan_(plan) {}
 
 std::uint32_t Covariates::need(Covariate covariate, const FunctionSettings& function) {
-  Column column{covariate, 0, 0, 0, 0, 0, 0, {}};
+  Column column;
+  column.covariate = covariate;
   if (is_of_neighbours(covariate)) {
     column.radius_mm = function.radius_mm;
+    column.others = function.others;
+    column.other_robots = function.other_robots;
     if (is_sum(covariate) && function.focus > 0) {
       column.focus = function.focus;
       column.toward_rad = function.toward_deg * (kPi / 180);
@@ -77,7 +80,8 @@ std::uint32_t Covariates::need(Covariate covariate, const FunctionSettings& func
   for (std::uint32_t i = 0; i < columns_.size(); ++i) {
     const Column& known = columns_[i];
     if (known.covariate == covariate && known.radius_mm == column.radius_mm && known.forget_s == column.forget_s &&
-        known.focus == column.focus && known.toward_rad == column.toward_rad && known.field == column.field) {
+        known.focus == column.focus && known.toward_rad == column.toward_rad && known.field == column.field &&
+        known.others == column.others && known.other_robots == column.other_robots) {
       return i;
     }
   }
@@ -101,6 +105,7 @@ Range Covariates::range(std::uint32_t index) const {
     case Covariate::kPreviousLasted:
     case Covariate::kSinceRest: return {0, duration_s};
     case Covariate::kMotorTimeDifference: return {-duration_s, duration_s};
+    case Covariate::kMotorTimeSum: return {0, 2 * duration_s};
     case Covariate::kX: return {-x_mm, x_mm};
     case Covariate::kY: return {-y_mm, y_mm};
     case Covariate::kRadius: return {0, __builtin_sqrt(x_mm * x_mm + y_mm * y_mm)};
@@ -198,6 +203,14 @@ void Covariates::fill(Column& column, Tick now, const RobotColumns& robots, std:
         return memory[left] - memory[right];
       });
     }
+    case Covariate::kMotorTimeSum: {
+      const std::uint32_t left = plan_.memory.index_of({Kind::kLeftMotorTime}),
+                          right = plan_.memory.index_of({Kind::kRightMotorTime});
+      return each([&](std::size_t r) {
+        const double* const memory = robots.memory.data() + r * stride;
+        return memory[left] + memory[right];
+      });
+    }
     case Covariate::kLastTurn:
       return each([&](std::size_t r) {
         const MotionCommand command = command_of(robots.duties[r]);
@@ -226,6 +239,13 @@ void Covariates::fill(Column& column, Tick now, const RobotColumns& robots, std:
   }
 }
 
+bool Covariates::counts(const Column& column, const RobotColumns& robots, std::uint32_t other) {
+  if (column.others != Others::kAny && robots.duties[other].any() != (column.others == Others::kDriven))
+    return false;
+  return column.other_robots.empty() ||
+         std::binary_search(column.other_robots.begin(), column.other_robots.end(), robots.robot[other]);
+}
+
 void Covariates::fill_neighbours(const RobotColumns& robots, std::span<const std::uint32_t> who) {
   cells_->build(robots.x_mm, robots.y_mm);
   for (std::size_t i = 0; i < who.size(); ++i) {
@@ -240,7 +260,7 @@ void Covariates::fill_neighbours(const RobotColumns& robots, std::span<const std
       if (column.focus > 0) kt_sincos(robots.heading_rad[self] + column.toward_rad, &toward_y, &toward_x);
       for (std::size_t k = 0; k < count; ++k) {
         const double dx = robots.x_mm[found_[k]] - x, dy = robots.y_mm[found_[k]] - y, square = dx * dx + dy * dy;
-        if (square > radius_square_mm2) continue;
+        if (square > radius_square_mm2 || !counts(column, robots, found_[k])) continue;
         double share = 1;
         // A neighbour at the same position has no direction; its cosine counts as 0.
         if (column.focus > 0) {

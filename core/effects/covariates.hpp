@@ -38,9 +38,11 @@ class Covariates {
 
  private:
   struct Column {
-    Covariate covariate;
+    Covariate covariate = Covariate::kNothing;
     double radius_mm = 0, forget_s = 0, toward_rad = 0;
     std::uint32_t focus = 0;
+    Others others = Others::kAny;
+    std::vector<std::uint32_t> other_robots;  ///< ascending; empty: all
     std::uint32_t field = 0;
     std::uint32_t slot = 0;  ///< of the memory, for covariates that are stored there
     std::vector<double> values;
@@ -48,6 +50,8 @@ class Covariates {
 
   void fill(Column&, Tick, const RobotColumns&, std::span<const std::uint32_t> who, const ArenaFields*) const;
   void fill_neighbours(const RobotColumns&, std::span<const std::uint32_t> who);
+  /// Whether a robot counts as a neighbour in a column.
+  [[nodiscard]] static bool counts(const Column&, const RobotColumns&, std::uint32_t other);
 
   const RunPlan& plan_;
   std::vector<Column> columns_;

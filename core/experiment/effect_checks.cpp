@@ -147,6 +147,10 @@ class EffectCheck {
            function.has_radius_mm()
                ? "radius_mm has no effect here; it goes with NEIGHBOURS, NEAREST, DENSITY and NEAREST_BEARING"
                : "radius_mm is missing; state how far away robots count, mm");
+    demand(!function.has_others() || any(needs_radius), path + ".others",
+           "others has no effect here; it goes with NEIGHBOURS, NEAREST, DENSITY and NEAREST_BEARING");
+    demand(function.other_robot().empty() || any(needs_radius), path + ".other_robot",
+           "other_robot has no effect here; it goes with NEIGHBOURS, NEAREST, DENSITY and NEAREST_BEARING");
     demand(!function.has_focus() || any(adds_up), path + ".focus",
            "focus has no effect here; it goes with NEIGHBOURS and DENSITY");
     demand(!function.has_toward_deg() || function.focus() > 0, path + ".toward_deg",

@@ -96,6 +96,7 @@ constexpr FieldRule kRules[] = {
     {"Function.forget_s", 0, kLongest_s, "s"},
     {"Function.focus", 0, 16, ""},
     {"Function.toward_deg", -360, 360, "degrees"},
+    {"Function.other_robot", 0, kMostRobots - 1, ""},
     {"Function.constant", -kLargestValue, kLargestValue, ""},
     {"Linear.at_zero", -kLargestValue, kLargestValue, ""},
     {"Linear.slope", -kLargestValue, kLargestValue, ""},

@@ -44,8 +44,12 @@ enum class Covariate : std::uint8_t {
   kSinceRest,
   kMotorTimeDifference,
   kEarlierTurn,
-  kCommandCount
+  kCommandCount,
+  kMotorTimeSum
 };
+
+/// Other robots that count as neighbours, by what they do in the coming tick.
+enum class Others : std::uint8_t { kAny, kDriven, kResting };
 
 struct ConstantShape {
   double value = 0;
@@ -88,6 +92,9 @@ struct FunctionSettings {
   double forget_s = 0;
   std::uint32_t focus = 0;
   double toward_deg = 0;
+  Others others = Others::kAny;
+  std::vector<std::uint32_t>
+      other_robots;  ///< numbers of the only robots that count as neighbours, ascending; empty: all
   std::variant<ConstantShape, LinearShape, ExponentialShape, HarmonicShape, SplineShape, Spline2dShape, StepsShape,
                TableShape, NoiseShape, EpisodesShape>
       shape;

@@ -33,6 +33,7 @@ MemoryLayout::MemoryLayout(const std::vector<EffectSettings>& effects,
       case Covariate::kDrivenTime: need({Kind::kDrivenTime, forget_s}); break;
       case Covariate::kSinceRest: need({Kind::kSinceRest}); break;
       case Covariate::kMotorTimeDifference:
+      case Covariate::kMotorTimeSum:
         need({Kind::kLeftMotorTime});
         need({Kind::kRightMotorTime});
         break;

@@ -95,6 +95,9 @@ Scene smaller(Scene scene) {
   scene.height_mm *= 0.75;
   scene.train_s *= 0.75;
   scene.test_runs = 1;
+  // Swapped robots must be there.
+  for (Fault& fault : scene.faults)
+    if (fault.kind == Fault::Kind::kSwapped) fault.other %= scene.robots;
   return scene;
 }
 

@@ -71,6 +71,7 @@ std::optional<std::pair<double, double>> range_of(Function::Covariate c, double 
     case Function::DRIVEN_TIME:
     case Function::SINCE_REST: return {{0, duration_s}};
     case Function::MOTOR_TIME_DIFFERENCE: return {{-duration_s / 2, duration_s / 2}};
+    case Function::MOTOR_TIME_SUM: return {{0, 2 * duration_s}};
     case Function::TIME_SINCE_COMMAND:
     case Function::PREVIOUS_LASTED: return {{0, kCommand_s}};
     case Function::X:

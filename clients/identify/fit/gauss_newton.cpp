@@ -57,6 +57,8 @@ bool acts_on_speed(const Block& block) {
     case Target::kGainLeft:
     case Target::kGainRight:
     case Target::kOffset:
+    case Target::kOffsetLeft:
+    case Target::kOffsetRight:
     case Target::kAhead: return true;
     default: return false;
   }

@@ -118,6 +118,8 @@ class Sensitivities {
         case Target::kGainLeft: add(left * gained_left, of_left_); break;
         case Target::kGainRight: add(right * gained_right, right_values); break;
         case Target::kOffset: add(ahead, of_left_); break;
+        case Target::kOffsetLeft: add(left, of_left_); break;
+        case Target::kOffsetRight: add(right, right_values); break;
         case Target::kTurn: add(turn, of_left_); break;
         case Target::kAhead: add(ahead, of_left_); break;
         case Target::kSideways: add(sideways, of_left_); break;

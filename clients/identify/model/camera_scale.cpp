@@ -268,6 +268,8 @@ bool rescale(MotionModel& model, double factor) {
       }
       switch (block.target) {
         case Target::kOffset:
+        case Target::kOffsetLeft:
+        case Target::kOffsetRight:
         case Target::kAhead:
         case Target::kSideways:
         case Target::kWorldX:

@@ -17,7 +17,25 @@ double motor_on_s(const CommandState& commands, std::size_t motor, std::uint8_t 
 }
 
 /// Whether the covariate needs the list of neighbours, since no precomputed sum covers it.
-bool is_listed(const Axis& axis) { return axis.focus > 0 || axis.within_mm > 0; }
+bool is_listed(const Axis& axis) { return axis.focus > 0 || axis.within_mm > 0 || is_of_some(axis); }
+
+bool counts(const Axis& axis, const OtherRobot& other) {
+  if (axis.others != Others::kAny && other.driven != (axis.others == Others::kDriven)) return false;
+  return axis.only_robot == 0 || other.robot + 1 == axis.only_robot;
+}
+
+/// The nearest neighbour that counts; null: none within the radius.
+const OtherRobot* nearest(const Axis& axis, const NeighbourView& near) {
+  const OtherRobot* best = nullptr;
+  const double reach = reach_mm(axis);
+  for (std::uint32_t i = 0; i < near.listed; ++i) {
+    const OtherRobot& other = (*near.list)[near.first_listed + i];
+    if (other.distance_mm <= reach && counts(axis, other) &&
+        (best == nullptr || other.distance_mm < best->distance_mm))
+      best = &other;
+  }
+  return best;
+}
 
 /// Directional sum over neighbours. Without a list, all neighbours count as if they lay in that direction.
 double toward(const Axis& axis, const Situation& s) {
@@ -31,7 +49,7 @@ double toward(const Axis& axis, const Situation& s) {
   double sum = 0;
   for (std::uint32_t i = 0; i < near.listed; ++i) {
     const OtherRobot& other = (*near.list)[near.first_listed + i];
-    if (other.distance_mm > reach) continue;
+    if (other.distance_mm > reach || !counts(axis, other)) continue;
     const double once = (1 + other.towards_x * ahead_x + other.towards_y * ahead_y) / 2;
     const double part = 1 - other.distance_mm * other.distance_mm / (reach * reach);
     double share = count ? 1 : part * part;
@@ -60,15 +78,25 @@ double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
     case Covariate::kRightMotorTime: return motor_on_s(s.commands, 1, axis.decay_index);
     case Covariate::kDrivenTime: return motor_on_s(s.commands, 2, axis.decay_index);
     case Covariate::kNeighbours: return is_listed(axis) ? toward(axis, s) : s.near.count[axis.radius];
-    case Covariate::kNearest: return std::min(s.near.nearest_mm, reach_mm(axis));
+    case Covariate::kNearest:
+      if (is_of_some(axis) && s.near.list != nullptr) {
+        const OtherRobot* const other = nearest(axis, s.near);
+        return other != nullptr ? other->distance_mm : reach_mm(axis);
+      }
+      return std::min(s.near.nearest_mm, reach_mm(axis));
     case Covariate::kDensity: return is_listed(axis) ? toward(axis, s) : s.near.density[axis.radius];
     case Covariate::kBearing:
+      if (is_of_some(axis) && s.near.list != nullptr) {
+        const OtherRobot* const other = nearest(axis, s.near);
+        return other != nullptr ? wrapped_angle(std::atan2(other->towards_y, other->towards_x) - s.heading_rad) : 0;
+      }
       return s.near.nearest_mm > reach_mm(axis) ? 0 : wrapped_angle(s.near.direction_rad - s.heading_rad);
     case Covariate::kPreviousCommand:
       return s.commands.first ? kNoCommand : static_cast<double>(s.commands.previous);
     case Covariate::kPreviousLasted: return s.commands.previous_lasted_s;
     case Covariate::kSinceRest: return s.commands.since_rest_s;
     case Covariate::kMotorTimeDifference: return s.commands.motor_s[1] - s.commands.motor_s[0];
+    case Covariate::kMotorTimeSum: return s.commands.motor_s[0] + s.commands.motor_s[1];
     case Covariate::kLastTurn: return static_cast<double>(s.commands.last_turn);
     case Covariate::kEarlierTurn: return static_cast<double>(s.commands.earlier_turn);
     case Covariate::kCommandCount: return s.commands.count;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "clients/identify/data/command_clock.hpp"
+#include "core/plan/effect_settings.hpp"
 
 namespace kilotwin::identify {
 
@@ -23,9 +24,11 @@ inline constexpr std::size_t kFirstTrailGrid = 10;
 struct OtherRobot {
   float distance_mm = 0;               ///< centre to centre
   float towards_x = 0, towards_y = 0;  ///< unit vector; 0 if both are at the same place
+  std::uint32_t robot = 0;             ///< robot number
+  bool driven = true;                  ///< whether a motor is commanded to turn
 };
 /// Radius of the list of neighbours, mm.
-inline constexpr double kListed_mm = 150;
+inline constexpr double kListed_mm = 160;
 
 /// The neighbours of one robot at one instant, and the traffic at its place.
 struct NeighbourView {
@@ -76,6 +79,7 @@ enum class Covariate : std::uint8_t {
   kCommandCount,         ///< number of changes of the command, that to the present one included
   kSinceRest,            ///< time since the last rest, s
   kMotorTimeDifference,  ///< motor-on time of the right wheel's motor minus that of the left one's, s
+  kMotorTimeSum,         ///< motor-on times of both motors added, s
   kTraffic,              ///< of the floor cell, as NeighbourView::traffic
   kRobot,
   kRun,
@@ -94,10 +98,17 @@ struct Axis {
   std::int16_t toward_deg = 0;
   /// For neighbours: a radius in mm, at most kListed_mm, in place of kNeighbourRadii_mm[radius]; 0: none.
   float within_mm = 0;
+  /// For neighbours up to kListed_mm: the robots that count.
+  Others others = Others::kAny;
+  std::uint32_t only_robot = 0;  ///< 1 + number of the only robot that counts; 0: all
 
   bool operator==(const Axis&) const = default;
 };
 
+/// Whether only some of the neighbours count.
+[[nodiscard]] constexpr bool is_of_some(const Axis& axis) {
+  return axis.others != Others::kAny || axis.only_robot > 0;
+}
 /// The radius of a neighbour covariate, mm.
 [[nodiscard]] double reach_mm(const Axis&);
 /// `wheel`: 0 left, 1 right; used by kMotorTime only.

@@ -35,6 +35,7 @@ Function::Covariate covariate_of(Covariate c) {
     case Covariate::kPreviousLasted: return Function::PREVIOUS_LASTED;
     case Covariate::kSinceRest: return Function::SINCE_REST;
     case Covariate::kMotorTimeDifference: return Function::MOTOR_TIME_DIFFERENCE;
+    case Covariate::kMotorTimeSum: return Function::MOTOR_TIME_SUM;
     case Covariate::kLastTurn: return Function::LAST_TURN;
     case Covariate::kEarlierTurn: return Function::EARLIER_TURN;
     case Covariate::kCommandCount: return Function::COMMAND_COUNT;
@@ -60,7 +61,8 @@ Situation with(const Axis& axis, double value, Situation s = {}) {
     case Covariate::kPreviousLasted: s.commands.previous_lasted_s = value; break;
     case Covariate::kSinceRest: s.commands.since_rest_s = value; break;
     case Covariate::kCommandCount: s.commands.count = value; break;
-    case Covariate::kMotorTimeDifference: s.commands.motor_s = {0, value}; break;
+    case Covariate::kMotorTimeDifference:
+    case Covariate::kMotorTimeSum: s.commands.motor_s = {0, value}; break;
     case Covariate::kNeighbours: s.near.count[axis.radius] = static_cast<float>(value); break;
     case Covariate::kMotorTime:
     case Covariate::kLeftMotorTime:
@@ -90,7 +92,12 @@ double sum_at(const Factor& factor, const Eigen::VectorXd& coefficients, const S
 
 void set_axis(Function& function, const Factor& factor) {
   function.set_of(covariate_of(factor.axis.of));
-  if (is_of_neighbours(factor.axis.of)) function.set_radius_mm(reach_mm(factor.axis));
+  if (is_of_neighbours(factor.axis.of)) {
+    function.set_radius_mm(reach_mm(factor.axis));
+    if (factor.axis.others == Others::kDriven) function.set_others(Function::DRIVEN_OTHERS);
+    if (factor.axis.others == Others::kResting) function.set_others(Function::RESTING_OTHERS);
+    if (factor.axis.only_robot > 0) function.add_other_robot(factor.axis.only_robot - 1);
+  }
   if (factor.axis.focus > 0) {
     function.set_focus(factor.axis.focus);
     if (factor.axis.toward_deg != 0) function.set_toward_deg(factor.axis.toward_deg);
@@ -322,6 +329,14 @@ void set_target(Effect& effect, Target target) {
       effect.set_wheel(Effect::RIGHT_WHEEL);
       break;
     case Target::kOffset: effect.set_acts_on(Effect::WHEEL_OFFSET); break;
+    case Target::kOffsetLeft:
+      effect.set_acts_on(Effect::WHEEL_OFFSET);
+      effect.set_wheel(Effect::LEFT_WHEEL);
+      break;
+    case Target::kOffsetRight:
+      effect.set_acts_on(Effect::WHEEL_OFFSET);
+      effect.set_wheel(Effect::RIGHT_WHEEL);
+      break;
     case Target::kTurn: effect.set_acts_on(Effect::TURN_RATE); break;
     case Target::kAhead: effect.set_acts_on(Effect::BODY_DRIFT); break;
     case Target::kSideways:

@@ -51,6 +51,7 @@ Unit unit_of(Function::Covariate of) {
     case Function::DRIVEN_TIME:
     case Function::SINCE_REST:
     case Function::MOTOR_TIME_DIFFERENCE:
+    case Function::MOTOR_TIME_SUM:
     case Function::PLACE: return {"s", 1};
     case Function::X:
     case Function::Y:
@@ -77,6 +78,7 @@ const char* name_of(Function::Covariate of) {
     case Function::DRIVEN_TIME: return "driven_time";
     case Function::SINCE_REST: return "time since the last rest";
     case Function::MOTOR_TIME_DIFFERENCE: return "motor-on time, left minus right";
+    case Function::MOTOR_TIME_SUM: return "motor-on time of both motors";
     case Function::X: return "x";
     case Function::Y: return "y";
     case Function::RADIUS: return "radius";
@@ -246,7 +248,17 @@ std::string which_of(const Effect& effect) {
                                                   : std::abs(f.toward_deg()) == 180 ? "behind"
                                                   : f.toward_deg() > 0              ? "on the left"
                                                                                     : "on the right"));
+    if (f.others() == Function::DRIVEN_OTHERS) parts.emplace_back("others that drive");
+    if (f.others() == Function::RESTING_OTHERS) parts.emplace_back("others at rest");
+    if (f.other_robot_size() > 0) parts.push_back(fmt::format("near robot {}", fmt::join(f.other_robot(), ", ")));
   }
+  // A product of covariates of the same neighbours names them once.
+  for (std::size_t i = 1; i < parts.size();)
+    if (std::find(parts.begin(), parts.begin() + static_cast<std::ptrdiff_t>(i), parts[i]) !=
+        parts.begin() + static_cast<std::ptrdiff_t>(i))
+      parts.erase(parts.begin() + static_cast<std::ptrdiff_t>(i));
+    else
+      ++i;
   return parts.empty() ? "" : fmt::format("{}: ", fmt::join(parts, ", "));
 }
 

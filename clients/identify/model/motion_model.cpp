@@ -82,6 +82,8 @@ void add(const Block& block, double left, double right, double wheel_base_mm, Mo
       change.left_mm_s += left;
       change.right_mm_s += right;
       break;
+    case Target::kOffsetLeft: change.left_mm_s += left; break;
+    case Target::kOffsetRight: change.right_mm_s += right; break;
     case Target::kTurn:
       rates.turn_effects_rad_s += left;
       offset(Kind::kTurnRate, 0, 0);

@@ -52,7 +52,9 @@ enum class Target : std::uint8_t {
   kGain,  ///< relative, both wheels
   kGainLeft,
   kGainRight,
-  kOffset,    ///< mm/s, both wheels
+  kOffset,  ///< mm/s, both wheels
+  kOffsetLeft,
+  kOffsetRight,
   kTurn,      ///< rad/s
   kAhead,     ///< mm/s, along the heading
   kSideways,  ///< mm/s, to the left

@@ -6,7 +6,7 @@
 namespace kilotwin::identify {
 
 NeighbourView view_of(std::size_t robot, std::span<const double> x_mm, std::span<const double> y_mm,
-                      std::vector<OtherRobot>* list) {
+                      std::vector<OtherRobot>* list, std::span<const Neighbour> who) {
   NeighbourView view;
   if (list != nullptr) {
     view.list = list;
@@ -24,7 +24,9 @@ NeighbourView view_of(std::size_t robot, std::span<const double> x_mm, std::span
     }
     if (list != nullptr && d2 <= kListed_mm * kListed_mm) {
       const double d = std::sqrt(d2), by = d > 0 ? 1 / d : 0;
-      list->push_back({static_cast<float>(d), static_cast<float>(dx * by), static_cast<float>(dy * by)});
+      const Neighbour is = who.empty() ? Neighbour{} : who[other];
+      list->push_back(
+          {static_cast<float>(d), static_cast<float>(dx * by), static_cast<float>(dy * by), is.robot, is.driven});
     }
     for (std::size_t r = kNeighbourRadii_mm.size(); r-- > 0;) {
       const auto part = static_cast<float>(1 - d2 / (kNeighbourRadii_mm[r] * kNeighbourRadii_mm[r]));
@@ -57,12 +59,14 @@ RunNeighbours::RunNeighbours(const Run& run, const std::vector<Centres>* centres
   std::vector<CommandClock> clocks(run.tracks.begin(), run.tracks.end());
   std::vector<std::size_t> next(robots, 0);
   std::vector<double> x(robots), y(robots);
+  std::vector<Neighbour> who(robots);
   for (std::size_t i = 0; i < instants_; ++i) {
     const double t = start_s_ + static_cast<double>(i) * kRaster_s;
     for (std::size_t r = 0; r < robots; ++r) {
       const std::vector<Sample>& samples = run.tracks[r].samples;
       while (next[r] < samples.size() && samples[next[r]].time_s <= t) ++next[r];
       x[r] = y[r] = std::nan("");
+      who[r] = {run.tracks[r].robot, clocks[r].at(t + 1e-9).driven()};
       if (next[r] == 0) continue;
       const std::size_t last = next[r] - 1;
       const Sample& a = samples[last];
@@ -84,8 +88,8 @@ RunNeighbours::RunNeighbours(const Run& run, const std::vector<Centres>* centres
     }
     for (std::size_t r = 0; r < robots; ++r) {
       if (std::isnan(x[r])) continue;
-      views_[r * instants_ + i] = view_of(r, x, y, others_.get());
-      spots_[r * instants_ + i] = {x[r], y[r], clocks[r].at(t + 1e-9).driven()};
+      views_[r * instants_ + i] = view_of(r, x, y, others_.get(), who);
+      spots_[r * instants_ + i] = {x[r], y[r], who[r].driven};
     }
   }
 }

@@ -10,10 +10,16 @@
 
 namespace kilotwin::identify {
 
+/// A robot as the neighbour of another one, at one instant.
+struct Neighbour {
+  std::uint32_t robot = 0;  ///< robot number
+  bool driven = true;       ///< whether a motor is commanded to turn
+};
+
 /// The neighbours of one robot at one instant. x = NaN: the robot is absent. Appends the neighbours to `list` if
-/// given; the list must outlive the view.
+/// given; the list must outlive the view. `who`: one per robot, or empty: all are driven and have the number 0.
 [[nodiscard]] NeighbourView view_of(std::size_t robot, std::span<const double> x_mm, std::span<const double> y_mm,
-                                    std::vector<OtherRobot>* list = nullptr);
+                                    std::vector<OtherRobot>* list = nullptr, std::span<const Neighbour> who = {});
 
 /// Disc centres of a track at its sample times, mm.
 struct Centres {

@@ -183,10 +183,13 @@ class JointForecast {
     if (!neighbours_) return;
     locate();
     list_.clear();
+    who_.clear();
+    for (const Robot& robot : robots_)
+      who_.push_back({robot.view->track->robot, robot.view->clock->at(now_s_).driven()});
     for (std::size_t r = 0; r < robots_.size(); ++r) {
       robots_[r].near = {};
       if (std::isnan(x_[r])) continue;
-      robots_[r].near = view_of(r, x_, y_, &list_);
+      robots_[r].near = view_of(r, x_, y_, &list_, who_);
       const StateCovariance& p = robots_[r].filters.front().belief().covariance;
       const double uncertain = 1.5 * std::sqrt(p(0, 0) + p(1, 1));
       if (model_.contacts && robots_[r].near.nearest_mm < model_.contact_range_mm + std::min(uncertain, 20.0))
@@ -249,6 +252,7 @@ class JointForecast {
   const TrafficGrids& initial_grids_;
   std::vector<Robot> robots_;
   std::vector<double> x_, y_;
+  std::vector<Neighbour> who_;    ///< all robots as neighbours
   std::vector<OtherRobot> list_;  ///< neighbours of all robots
 };
 

@@ -61,7 +61,8 @@ class Rollout {
         normals_(key),
         x_(robots.size()),
         y_(robots.size()),
-        near_(robots.size()) {}
+        near_(robots.size()),
+        who_(robots.size()) {}
 
   /// Draws the robots' states. Samples come in antithetic pairs.
   void start(std::uint32_t sample) {
@@ -113,8 +114,10 @@ class Rollout {
   void see_neighbours(double now_s, double next_s, TrafficGrids& grids) {
     find_centres();
     list_.clear();
+    for (std::size_t r = 0; neighbours_ && r < robots_.size(); ++r)
+      who_[r] = {robots_[r].view->track->robot, robots_[r].view->clock->at(now_s).driven()};
     for (std::size_t r = 0; r < robots_.size(); ++r) {
-      near_[r] = neighbours_ ? view_of(r, x_, y_, &list_) : NeighbourView{};
+      near_[r] = neighbours_ ? view_of(r, x_, y_, &list_, who_) : NeighbourView{};
       grids.see(robots_[r].view->place, x_[r], y_[r], now_s, near_[r]);
     }
     for (std::size_t r = 0; grids.any() && r < robots_.size(); ++r)
@@ -148,6 +151,7 @@ class Rollout {
   std::vector<TrackFilter> filters_;
   std::vector<double> x_, y_;  ///< disc centres
   std::vector<NeighbourView> near_;
+  std::vector<Neighbour> who_;  ///< at the step's start
   std::vector<OtherRobot> list_;
 };
 

@@ -24,6 +24,7 @@ std::pair<std::string, std::string> covariate_words(Covariate covariate) {
     case Covariate::kMotorTime:
     case Covariate::kLeftMotorTime:
     case Covariate::kRightMotorTime:
+    case Covariate::kMotorTimeSum:
     case Covariate::kDrivenTime: return {"motor-time", "motor_time"};
     case Covariate::kNeighbours:
     case Covariate::kNearest:
@@ -37,7 +38,7 @@ std::pair<std::string, std::string> covariate_words(Covariate covariate) {
 /// A function of known factors, with its covariates. Amplitudes multiply it.
 struct Multiplied {
   Basis basis;
-  std::string name;                ///< "robot-and-time"; empty: a constant
+  std::string name;                ///< "time"; empty: a constant
   std::vector<std::string> words;  ///< covariates
   [[nodiscard]] bool is_of(const std::string& word) const {
     return std::find(words.begin(), words.end(), word) != words.end();
@@ -49,10 +50,9 @@ std::optional<Multiplied> multiplied_by(const Term& term) {
   const std::vector<Factor>& factors = term.blocks.front().basis.factors;
   Multiplied out;
   if (factors.empty()) return out;
-  if (factors.size() == 1 && (factors.front().shape == Shape::kTable || !factors.front().known.empty()))
+  if (factors.size() > 1 || factors.front().shape == Shape::kTable || !factors.front().known.empty())
     return std::nullopt;
-  out.basis.factors = known_factors(term);
-  if (out.basis.factors.empty()) return std::nullopt;
+  out.basis.factors = {known_curve(term, 0)};
   for (const Factor& factor : out.basis.factors) {
     const auto [name, word] = covariate_words(factor.axis.of);
     if (out.is_of(word)) return std::nullopt;

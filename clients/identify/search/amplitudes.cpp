@@ -1,6 +1,5 @@
 #include "clients/identify/search/amplitudes.hpp"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <utility>
 
@@ -22,41 +21,21 @@ bool is_known_of(const Factor& known, const Factor& open) {
          known.count == open.count && known.points == open.points;
 }
 
-/// The known factors of a basis.
-std::vector<const Factor*> known_of(const Basis& basis) {
-  std::vector<const Factor*> known;
-  for (const Factor& f : basis.factors)
-    if (!f.known.empty()) known.push_back(&f);
-  return known;
-}
-
-/// Index of the term whose curve, or product of two, these amplitudes multiply.
+/// Index of the term whose curve these amplitudes multiply.
 std::optional<std::size_t> source_of(const MotionModel& model, const Term& amplitudes) {
   const Block& block = amplitudes.blocks.front();
-  const std::vector<const Factor*> known = known_of(block.basis);
-  if (known.empty() || block.basis.factors.size() != known.size() + 1) return std::nullopt;
+  if (block.basis.factors.size() != 2) return std::nullopt;
+  const auto known = std::find_if(block.basis.factors.begin(), block.basis.factors.end(),
+                                  [](const Factor& f) { return !f.known.empty(); });
+  if (known == block.basis.factors.end()) return std::nullopt;
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
     const Block& of = model.terms[t].blocks.front();
     const std::vector<Factor>& factors = of.basis.factors;
-    if (of.target != block.target || of.during != block.during || factors.size() != known.size() ||
-        &model.terms[t] == &amplitudes || (factors.size() == 1 && !factors.front().known.empty()))
-      continue;
-    if (std::equal(known.begin(), known.end(), factors.begin(),
-                   [](const Factor* one, const Factor& open) { return is_known_of(*one, open); }))
+    if (of.target == block.target && of.during == block.during && factors.size() == 1 &&
+        factors.front().known.empty() && is_known_of(*known, factors.front()))
       return t;
   }
   return std::nullopt;
-}
-
-/// The factor with its columns collapsed into one.
-Factor collapsed(Factor factor, const Eigen::VectorXd& weights) {
-  if (factor.known.empty()) {
-    factor.known.assign(weights.begin(), weights.end());
-    return factor;
-  }
-  for (double& one : factor.known) one *= weights[0];
-  factor.plus *= weights[0];
-  return factor;
 }
 
 /// Normalises amplitudes to a mean of 1, which is the amplitude of an unseen robot. If the mean is near 0, the
@@ -126,11 +105,7 @@ class CurveTimesAmplitudes {
     fitter_.fit(state_, 2);
     likelihood_ = fitter_.log_likelihood(state_);
     in_turns();
-    // A product keeps its columns.
-    if (found_.blocks.front().basis.factors.size() > 2)
-      refit(fitter_, state_, model.terms.size() - 1);
-    else
-      refine_curves(fitter_, state_, model.terms.size() - 1);
+    refine_curves(fitter_, state_, model.terms.size() - 1);
     likelihood_ = fitter_.log_likelihood(state_);
     // The curve may have received a constant part, which the amplitudes lacked.
     in_turns();
@@ -151,7 +126,7 @@ class CurveTimesAmplitudes {
   }
   /// The curve of the merged term as known factors, with `open` at the place of the amplitudes.
   [[nodiscard]] std::vector<Factor> times_curve(const Factor& open) const {
-    std::vector<Factor> factors = known_factors(state_.model.terms.back(), 1);
+    std::vector<Factor> factors{known_curve(state_.model.terms.back(), 1)};
     factors.insert(factors.begin() + static_cast<std::ptrdiff_t>(open_), open);
     return factors;
   }
@@ -269,30 +244,6 @@ bool multiplies_known_curve(const Term& term) {
     return std::any_of(block.basis.factors.begin(), block.basis.factors.end(),
                        [](const Factor& factor) { return !factor.known.empty() && factor.plus == 0; });
   });
-}
-
-bool multiplies_product(const Term& term) {
-  return multiplies_known_curve(term) && known_of(term.blocks.front().basis).size() > 1;
-}
-
-std::vector<Factor> known_factors(const Term& term, std::size_t first) {
-  const Basis& basis = term.blocks.front().basis;
-  if (basis.factors.size() == first + 1) return {known_curve(term, first)};
-  if (basis.factors.size() != first + 2 || term.blocks.size() > 1) return {};
-  const Factor &one = basis.factors[first], &other = basis.factors[first + 1];
-  const auto columns = static_cast<Eigen::Index>(other.size());
-  Eigen::MatrixXd coefficients = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(one.size()), columns);
-  for (std::size_t i = 0; i < basis.size(); ++i) {
-    const auto at = static_cast<Eigen::Index>(basis.chosen.empty() ? i : basis.chosen[i]);
-    coefficients(at / columns, at % columns) = term.coefficients[static_cast<Eigen::Index>(i)];
-  }
-  const Eigen::JacobiSVD<Eigen::MatrixXd> parts(coefficients, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  Eigen::Index largest = 0;
-  Eigen::VectorXd left = parts.matrixU().col(0);
-  left.cwiseAbs().maxCoeff(&largest);
-  const double unit = left[largest];
-  left /= unit;
-  return {collapsed(one, left), collapsed(other, unit * parts.singularValues()[0] * parts.matrixV().col(0))};
 }
 
 }  // namespace kilotwin::identify

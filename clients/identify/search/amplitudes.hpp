@@ -17,12 +17,4 @@ namespace kilotwin::identify {
 
 /// Whether a term multiplies a curve that another term has fitted.
 [[nodiscard]] bool multiplies_known_curve(const Term&);
-/// Whether a term multiplies a product of two functions that another term has fitted.
-[[nodiscard]] bool multiplies_product(const Term&);
-
-/// The function of a term's first block as a product of known factors, without the factors before `first`: its curve, or of two
-/// factors the nearest product of one function of each (the largest singular value of the coefficients). Empty: it has no
-/// such form.
-[[nodiscard]] std::vector<Factor> known_factors(const Term&, std::size_t first = 0);
-
 }  // namespace kilotwin::identify

@@ -227,6 +227,7 @@ bool goes_on(const Axis& axis) {
     case Covariate::kMotorTime:
     case Covariate::kLeftMotorTime:
     case Covariate::kRightMotorTime:
+    case Covariate::kMotorTimeSum:
     case Covariate::kDrivenTime: return axis.decay_index == 0;
     default: return false;
   }

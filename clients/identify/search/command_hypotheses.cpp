@@ -89,6 +89,9 @@ std::vector<double> moving_commands(const Extent& extent) {
 void add_motor_time_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   const Basis motor{{over(Shape::kCosines, Covariate::kMotorTime, 0, extent.motor_s, 8)}};
   make.curve(kSpeed, "motor-time", {"motor_time"}, motor, {1, 3, 8}, false);
+  // Charge drawn from a common battery.
+  const Basis both{{over(Shape::kCosines, Covariate::kMotorTimeSum, 0, extent.sum_s, 8)}};
+  make.curve(kSpeed, "motor-time", {"motor_time"}, both, {1, 3, 8}, false);
   const Basis driven{{over(Shape::kCosines, Covariate::kDrivenTime, 0, extent.driven_s, 6)}};
   make.curve(kTurning, "driven-time", {"motor_time"}, driven, {1, 3, 6}, false);
 }

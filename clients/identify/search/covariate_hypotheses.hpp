@@ -35,6 +35,8 @@ void add_discounted_motor_time_hypotheses(DictionaryBuilder&, const Extent&);
 // Neighbours and traffic (neighbour_hypotheses.cpp).
 
 void add_neighbour_hypotheses(DictionaryBuilder&, const Extent&);
+/// Neighbours of which only some count: those that drive, those at rest, or one robot.
+void add_some_neighbours_hypotheses(DictionaryBuilder&, const Extent&);
 /// Driven time per floor cell.
 void add_traffic_hypotheses(DictionaryBuilder&);
 

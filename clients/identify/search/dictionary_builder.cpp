@@ -17,6 +17,8 @@ double natural(Target target) {
     case Target::kGainRight: return 1;
     case Target::kTurn: return 0.4;
     case Target::kOffset:
+    case Target::kOffsetLeft:
+    case Target::kOffsetRight:
     case Target::kAhead:
     case Target::kSideways:
     case Target::kWorldX:

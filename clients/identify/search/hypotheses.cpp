@@ -25,6 +25,7 @@ Extent extent_of(const PreparedSet& set) {
     e.duration_s = std::max(e.duration_s, end_s);
     e.motor_s = std::max({e.motor_s, last.motor_s[0], last.motor_s[1]});
     e.driven_s = std::max(e.driven_s, last.driven_s);
+    e.sum_s = std::max(e.sum_s, last.motor_s[0] + last.motor_s[1]);
     e.commands = std::max(e.commands, last.count);
     const auto note = [&](const CommandState& state) {
       e.since_rest_s = std::max(e.since_rest_s, state.since_rest_s);
@@ -66,6 +67,7 @@ Dictionary dictionary_of(const Extent& extent, const std::vector<Term>& found) {
   add_drift_hypotheses(make, extent, drift_in_time, drift_in_place);
   add_command_hypotheses(make, extent);
   add_neighbour_hypotheses(make, extent);
+  add_some_neighbours_hypotheses(make, extent);
   add_history_hypotheses(make, extent);
   add_inertia_hypotheses(make, extent);
   add_traffic_hypotheses(make);

@@ -41,6 +41,7 @@ struct Extent {
   double duration_s = 1, motor_s = 1, driven_s = 1, since_s = 1;
   double since_rest_s = 1;  ///< longest time without a rest
   double commands = 1;      ///< largest number of commands of a robot in a run
+  double sum_s = 1;         ///< largest sum of the motor-on times of a robot's two motors
   double difference_s = 1;  ///< largest difference between the motor-on times of a robot's two motors
   bool has_stop = false, has_turns = false, has_straight = false, neighbours = false, headings = false;
   std::vector<std::uint32_t> robots, runs;

@@ -166,9 +166,9 @@ std::vector<Form> forms_of_push(const PreparedSet& set, bool turns, std::uint8_t
   return forms;
 }
 
-/// The same forms with continuous radii around the present ones.
-std::vector<Form> with_radii_about(const std::vector<Form>& forms) {
-  constexpr int kAbout_mm = 9;
+/// The same forms with continuous radii around the present ones, and with wider and narrower directions.
+std::vector<Form> with_reach_about(const std::vector<Form>& forms) {
+  constexpr int kAbout_mm = 9, kLeastFocus = 1, kMostFocus = 12;
   std::vector<Form> out;
   for (const Form& form : forms) {
     for (int by_mm = -kAbout_mm; by_mm <= kAbout_mm; ++by_mm) {
@@ -184,8 +184,50 @@ std::vector<Form> with_radii_about(const std::vector<Form>& forms) {
       }
       if (listed) out.push_back(std::move(other));
     }
+    for (const int by : {-2, -1, 1, 2, 4}) {
+      Form other = form;
+      bool directed = true;
+      for (Block& block : other) {
+        for (Factor& f : block.basis.factors) {
+          const int focus = f.axis.focus + by;
+          directed = directed && f.axis.focus > 0 && focus >= kLeastFocus && focus <= kMostFocus;
+          f.axis.focus = static_cast<std::uint8_t>(std::max(0, focus));
+        }
+      }
+      if (directed) out.push_back(std::move(other));
+    }
   }
   return out;
+}
+
+/// The forms with neighbours of which only some count. Radii beyond the list of neighbours are left out.
+std::vector<Form> of_some(const std::vector<Form>& forms, const Axis& like) {
+  if (!is_of_some(like)) return forms;
+  std::vector<Form> out;
+  for (Form form : forms) {
+    bool listed = true;
+    for (Block& block : form) {
+      for (Factor& f : block.basis.factors) {
+        listed = listed && reach_mm(f.axis) <= kListed_mm;
+        f.axis.others = like.others;
+        f.axis.only_robot = like.only_robot;
+        // One robot counts once.
+        if (like.only_robot > 0 && f.shape == Shape::kAtLeast) f.points.resize(1);
+      }
+    }
+    if (listed) out.push_back(std::move(form));
+  }
+  return out;
+}
+
+/// Whether the neighbours that count are the same in all blocks.
+bool are_of_the_same(const std::vector<Block>& blocks) {
+  const Axis& first = blocks.front().basis.factors.front().axis;
+  return std::all_of(blocks.begin(), blocks.end(), [&](const Block& block) {
+    return std::all_of(block.basis.factors.begin(), block.basis.factors.end(), [&](const Factor& f) {
+      return f.axis.others == first.others && f.axis.only_robot == first.only_robot;
+    });
+  });
 }
 
 /// Selected forms, and the prior standard deviations of their columns.
@@ -268,9 +310,11 @@ bool refine_neighbour_shape(const Fitter& fitter, FitState& state, std::size_t p
   const std::vector<Block>& had = state.model.terms[place].blocks;
   if (had.empty() || !std::all_of(had.begin(), had.end(), is_of_neighbours)) return false;
   const bool pushes = had.front().target == Target::kTurn || had.front().target == Target::kSideways;
+  if (!are_of_the_same(had)) return false;
   std::vector<Form> forms =
-      pushes ? forms_of_push(state.tracks, had.front().target == Target::kTurn, had.front().during)
-             : forms_of_speed(state.tracks, had.front().during);
+      of_some(pushes ? forms_of_push(state.tracks, had.front().target == Target::kTurn, had.front().during)
+                     : forms_of_speed(state.tracks, had.front().during),
+              had.front().basis.factors.front().axis);
   double likelihood = fitter.log_likelihood(state);
   // Replaces the term by some of the forms if the gain exceeds `least_gain`.
   const auto try_forms = [&](const std::vector<Form>& of, std::size_t most, double least_gain) {
@@ -306,7 +350,7 @@ bool refine_neighbour_shape(const Fitter& fitter, FitState& state, std::size_t p
   // Noise and disc centres change with the first choice.
   fitter.fit_contacts(state);
   likelihood = fitter.log_likelihood(state);
-  const std::vector<Form> finer = try_forms(with_radii_about(first), kFirstForms, kLeastEvidence);
+  const std::vector<Form> finer = try_forms(with_reach_about(first), kFirstForms, kLeastEvidence);
   forms.insert(forms.end(), finer.begin(), finer.end());
   try_forms(forms, kMostForms, kLeastEvidence);
   return true;

@@ -20,6 +20,7 @@
 #include "clients/identify/search/total_variation_map.hpp"
 #include "clients/identify/search/traffic_shape.hpp"
 #include "clients/identify/search/travelling_waves.hpp"
+#include "clients/identify/search/wheel_offsets.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -70,7 +71,12 @@ class Loop {
       ++round_;
       note_stage();
     }
-    for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t) simplify(fitter_, out_.fit, t);
+    for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t) {
+      simplify(fitter_, out_.fit, t);
+      if (!is_constant_drift(out_.fit.model.terms[t])) continue;
+      out_.fit.model.terms[t].name = "drift";
+      out_.reasons[t].covariates = {"world_frame"};
+    }
     out_.work = out_.fit.tracks.work();
     return std::move(out_);
   }
@@ -95,7 +101,7 @@ class Loop {
       ++failures_;
     }
     say(kAlternatives, "testing alternatives");
-    return eliminate() || accept_third_covariate(outcome) || accept_general();
+    return eliminate() || accept_general();
   }
   /// The limit that the search has reached, in one sentence; empty: none. It then adds nothing more.
   [[nodiscard]] std::string limit() const {
@@ -174,15 +180,10 @@ class Loop {
       if (!good(f, outcome.threshold_log10_p) || f.evidence < least_evidence ||
           failed_.contains(hypothesis(f).name))
         continue;
-      if (multiplies_product(hypothesis(f))) continue;
       if (of_robots_and_more(hypothesis(f)) && parts_evidence(hypothesis(f), outcome) > f.evidence) continue;
       if (best == nullptr || f.evidence > best->evidence) best = &f;
     }
     return best;
-  }
-  /// Whether a hypothesis is an amplitude of an accepted product: accept_third_covariate().
-  [[nodiscard]] bool multiplies_product(const Hypothesis& h) const {
-    return h.covariates.size() > 2 && identify::multiplies_product(dictionary_.term_of(h, 1));
   }
   static bool of_robots_and_more(const Hypothesis& h) {
     return h.covariates.size() == 2 &&
@@ -297,32 +298,6 @@ class Loop {
     say(kAddition, "fitting " + wave.term.name);
     return fits(std::move(wave), kWave);
   }
-  /// Adds an amplitude of an accepted product over a third covariate. This is a question of the form: it need not pass
-  /// the threshold of a new effect, which rises with all that the product leaves unexplained. It has to explain a large
-  /// share instead, because smaller ones come from errors of the product's own form. Failures count apart: they say
-  /// nothing about new effects. Returns whether there is one that fits.
-  bool accept_third_covariate(const ScoreTest::Outcome& outcome) {
-    constexpr double kLeastNats = 10, kLeastShare = 0.1, kLeastHeldOut = 2, kMostLog10P = -3;
-    const double least = std::max(kLeastNats, kLeastShare * explained());
-    while (limit().empty() && failed_thirds_ < kMostFailed) {
-      std::optional<Finding> best;
-      for (const Finding& f : outcome.findings) {
-        const Hypothesis& h = hypothesis(f);
-        if (f.log10_p > kMostLog10P || failed_.contains(h.name) || !multiplies_product(h)) continue;
-        Finding own = score_test_->evidence_of(h, -1);
-        if (own.evidence < least || own.held_out < kLeastHeldOut || (best && own.evidence <= best->evidence))
-          continue;
-        own.hypothesis = f.hypothesis;
-        own.statistic = f.statistic;
-        own.log10_p = f.log10_p;
-        best = own;
-      }
-      if (!best) return false;
-      if (accepted(*best, outcome, kMostLog10P)) return true;
-      ++failed_thirds_;
-    }
-    return false;
-  }
   /// Adds the general term with the most evidence that fits, if much is left unexplained. Returns whether there is one.
   bool accept_general() {
     if (general_terms_ == kMostGeneral || !limit().empty() || !leaves_much_) return false;
@@ -426,7 +401,6 @@ class Loop {
     const Reason& of_curve = out_.reasons[*curve];
     Reason& of_both = out_.reasons.back();
     of_both.finding.evidence += of_curve.finding.evidence;
-    // The curve passed the threshold of a new effect. Amplitudes over a third covariate need not.
     of_both.finding.log10_p = std::min(of_both.finding.log10_p, of_curve.finding.log10_p);
     of_both.threshold_log10_p = of_curve.threshold_log10_p;
     out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(*curve));
@@ -437,13 +411,13 @@ class Loop {
   void refine_shape(std::size_t place) {
     if (out_.fit.model.terms[place].general) {
       refit(fitter_, out_.fit, place);
-      simplify_to_switch(fitter_, out_.fit, place);
+      became_switch(place);
       return;
     }
     if (!refine_neighbour_shape(fitter_, out_.fit, place) && !refine_traffic_shape(fitter_, out_.fit, place))
       refine_curves(fitter_, out_.fit, place);
     // Smooth curves leave residuals of a switch, which would pass the tests as one further term after another.
-    if (simplify_to_switch(fitter_, out_.fit, place)) return;
+    if (became_switch(place)) return;
     const std::string before = out_.fit.model.terms[place].name;
     if (refine_wave_numbers(fitter_, out_.fit, place)) refit(fitter_, out_.fit, place);
     const std::string name = find_change_points(fitter_, out_.fit, place);
@@ -457,6 +431,13 @@ class Loop {
     fit_total_variation_map(fitter_, out_.fit, place);
     fit_central_distortion(fitter_, out_.fit, place);
     extend_targets(fitter_, out_.fit, place);
+  }
+  /// Replaces curves per robot or command by amplitudes from an instant on, and these by a change of each wheel, if the evidence
+  /// rises. Returns whether there is an instant.
+  bool became_switch(std::size_t place) {
+    if (!simplify_to_switch(fitter_, out_.fit, place)) return false;
+    if (replace_by_wheel_offsets(fitter_, out_.fit, place)) out_.reasons[place].acts_on = "speed of each wheel";
+    return true;
   }
   /// Tests camera motion against a drift of the robots. Robots at rest and walls separate the two.
   void try_camera_motion() {
@@ -659,7 +640,6 @@ class Loop {
   Alternatives alternatives_;
   std::set<std::string> failed_;  ///< hypotheses that failed after the refit
   int eliminations_ = 0, round_ = 0, failures_ = 0;
-  int failed_thirds_ = 0;     ///< failed amplitudes over a third covariate
   bool starts_anew_ = false;  ///< with a lag
 };
 

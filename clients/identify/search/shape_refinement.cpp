@@ -210,6 +210,7 @@ bool paired(Target a, Target b) {
       case Target::kWorldY: return Target::kWorldX;
       case Target::kMeasuredY: return Target::kMeasuredX;
       case Target::kGainRight: return Target::kGainLeft;
+      case Target::kOffsetRight: return Target::kOffsetLeft;
       default: return t;
     }
   };

@@ -284,6 +284,14 @@ bool simplify_to_switch(const Fitter& fitter, FitState& state, std::size_t place
   return replaced;
 }
 
+bool is_constant_drift(const Term& term) {
+  return term.name != "drift-at-rest" && !term.blocks.empty() &&
+         std::all_of(term.blocks.begin(), term.blocks.end(), [](const Block& block) {
+           return block.basis.factors.empty() &&
+                  (block.target == Target::kWorldX || block.target == Target::kWorldY);
+         });
+}
+
 bool simplify(const Fitter& fitter, FitState& state, std::size_t place) {
   if (simplify_to_switch(fitter, state, place)) return true;
   const Factor* const curve = curve_of(state.model.terms[place]);

@@ -13,4 +13,7 @@ bool simplify_to_switch(const Fitter&, FitState&, std::size_t term);
 /// Returns whether a simpler form replaced the term's curves.
 bool simplify(const Fitter&, FitState&, std::size_t term);
 
+/// Whether a term is a drift in the world frame that depends on nothing, although its name says more.
+[[nodiscard]] bool is_constant_drift(const Term&);
+
 }  // namespace kilotwin::identify

@@ -175,63 +175,6 @@ TEST(History, AnEffectOfPositionIsAlsoTestedOverTime) {
     EXPECT_NEAR(values[k], there * std::cos(M_PI * static_cast<double>(k + 1) * 0.25), 1e-12);
 }
 
-/// Robots 3, 5 and 9 over time: amplitudes 0.5, -1 and 0.25 times a curve of two cosines.
-Term of_robots_over_time() {
-  Factor robots, curve;
-  robots.shape = Factor::Shape::kTable;
-  robots.axis.of = Covariate::kRobot;
-  robots.points = {3, 5, 9};
-  curve.shape = Factor::Shape::kCosines;
-  curve.axis.of = Covariate::kTime;
-  curve.high = 100;
-  curve.count = 2;
-  Term term;
-  term.name = "speed-by-robot-and-time";
-  term.blocks = {{Target::kGain, Basis{{robots, curve}}}};
-  term.coefficients = Eigen::VectorXd(6);
-  term.coefficients << 0.5 * 0.2, 0.5 * -0.6, -0.2, 0.6, 0.25 * 0.2, 0.25 * -0.6;
-  term.precision = Eigen::VectorXd::Ones(6);
-  return term;
-}
-
-TEST(History, AProductIsTheNearestOneOfTwoFunctions) {
-  const Term term = of_robots_over_time();
-  const std::vector<Factor> factors = known_factors(term);
-  ASSERT_EQ(factors.size(), 2u);
-  for (const std::uint32_t robot : {3u, 5u, 9u, 4u}) {
-    Situation s;
-    s.time_s = 30;
-    s.robot = robot;
-    double product = 1;
-    for (const Factor& factor : factors) {
-      double value = 0;
-      factor.evaluate(s, 0, &value);
-      product *= value;
-    }
-    const double amplitude = robot == 3 ? 0.5 : robot == 5 ? -1 : robot == 9 ? 0.25 : 0;
-    EXPECT_NEAR(product, amplitude * (0.2 * std::cos(0.3 * M_PI) - 0.6 * std::cos(0.6 * M_PI)), 1e-12) << robot;
-  }
-}
-
-TEST(History, AnEffectOfTwoCovariatesIsTestedOverAThird) {
-  Extent extent;
-  extent.duration_s = 100;
-  extent.x_low_mm = extent.y_low_mm = -100;
-  extent.x_high_mm = extent.y_high_mm = 100;
-  extent.has_straight = extent.has_turns = true;
-  extent.robots = {3, 5, 9};
-  const Dictionary without = dictionary_of(extent), with = dictionary_of(extent, {of_robots_over_time()});
-  // Three commands, nine cosines over the plane and two harmonics of the heading; neither robots nor time again.
-  EXPECT_EQ(with.columns(), without.columns() + 3 + 9 + 4);
-  const auto of = [&](const std::string& name) {
-    return std::any_of(with.hypotheses.begin(), with.hypotheses.end(),
-                       [&](const Hypothesis& h) { return h.name == name && h.covariates.size() == 3; });
-  };
-  EXPECT_TRUE(of("speed-by-robot-and-time-and-position"));
-  EXPECT_TRUE(of("speed-by-robot-and-time-and-heading"));
-  EXPECT_TRUE(of("speed-by-command-and-robot-and-time"));
-}
-
 TEST(History, ADriftOverTimeOrPlaceHasAConstantPart) {
   Extent extent;
   extent.has_straight = true;

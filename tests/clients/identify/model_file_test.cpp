@@ -73,6 +73,12 @@ std::vector<Form> forms() {
     f.axis.within_mm = radius_mm;
     return f;
   };
+  const auto among = [](Factor f, Others others, std::uint32_t robot) {
+    f.axis.radius = 11;
+    f.axis.others = others;
+    f.axis.only_robot = robot == 0 ? 0 : robot + 1;
+    return f;
+  };
   Factor known = over(Shape::kCosines, Covariate::kTime, 0, 18, 3);
   known.known = {0.7, 0, -0.4};
   Factor amplitudes = over(Shape::kTable, Covariate::kRobot, 0, 1, 1, {3, 5});
@@ -143,13 +149,22 @@ std::vector<Form> forms() {
        {{over(Shape::kTable, Covariate::kRobot, 0, 1, 1, {3, 5}),
          over(Shape::kLinear, Covariate::kTime, 0, 15, 1)}}},
       {"earlier turn", {{over(Shape::kTable, Covariate::kEarlierTurn, 0, 1, 1, {2, 3})}}},
-      {"number of commands", {{over(Shape::kCosines, Covariate::kCommandCount, 0, 9, 4)}}}};
+      {"number of commands", {{over(Shape::kCosines, Covariate::kCommandCount, 0, 9, 4)}}},
+      {"sum of use", {{over(Shape::kCosines, Covariate::kMotorTimeSum, 0, 20, 3)}}},
+      {"density of driven others",
+       {{among(over(Shape::kCosines, Covariate::kDensity, 0, 4, 2), Others::kDriven, 0)}}},
+      {"density of others at rest",
+       {{among(over(Shape::kCosines, Covariate::kDensity, 0, 4, 2), Others::kResting, 0)}}},
+      {"distance of one robot", {{among(over(Shape::kTaper, Covariate::kNearest, 0, 150, 2), Others::kAny, 5)}}},
+      {"distance of one driven robot",
+       {{among(over(Shape::kTaper, Covariate::kNearest, 0, 150, 2), Others::kDriven, 7)}}}};
 }
 
 const char* name_of(Target target) {
-  constexpr const char* kNames[] = {
-      "gain",    "gain left",  "gain right", "offset",     "turn",      "ahead", "sideways", "world x",
-      "world y", "measured x", "measured y", "body ahead", "body left", "scale", "picture",  "measured heading"};
+  constexpr const char* kNames[] = {"gain",         "gain left",  "gain right",      "offset",     "offset left",
+                                    "offset right", "turn",       "ahead",           "sideways",   "world x",
+                                    "world y",      "measured x", "measured y",      "body ahead", "body left",
+                                    "scale",        "picture",    "measured heading"};
   return kNames[static_cast<std::size_t>(target)];
 }
 
@@ -224,6 +239,9 @@ class WrittenModelTest : public testing::Test {
         y.push_back(s.y + model_.base.centre_mm * std::sin(s.heading));
       }
       std::vector<Situation> all(states.size());
+      std::vector<Neighbour> who;
+      for (std::size_t r = 0; r < states.size(); ++r)
+        who.push_back({scene.robots[r].track->robot, clocks[r].at(time_s + within_s).driven()});
       list_.clear();
       for (std::size_t r = 0; r < states.size(); ++r) {
         all[r] = {time_s,
@@ -231,7 +249,7 @@ class WrittenModelTest : public testing::Test {
                   y[r],
                   wrapped_angle(states[r].heading),
                   clocks[r].at(time_s + within_s),
-                  view_of(r, x, y, &list_),
+                  view_of(r, x, y, &list_, who),
                   scene.robots[r].track->robot,
                   0};
         // At the start of a tick, motor-on times exclude this tick.

@@ -87,6 +87,11 @@ TEST_F(ValidateEffects, ErrorsNameTheirPlace) {
        "e.txtpb:2:59: radius_mm has no effect here; it goes with NEIGHBOURS, NEAREST, DENSITY and NEAREST_BEARING"},
       {"effect { name: 'a' acts_on: TURN_RATE function { of: NEAREST radius_mm: 5 focus: 2 linear { } } }",
        "e.txtpb:2:75: focus has no effect here; it goes with NEIGHBOURS and DENSITY"},
+      {"effect { name: 'a' acts_on: TURN_RATE function { of: TIME others: DRIVEN_OTHERS linear { } } }",
+       "e.txtpb:2:59: others has no effect here; it goes with NEIGHBOURS, NEAREST, DENSITY and NEAREST_BEARING"},
+      {"effect { name: 'a' acts_on: TURN_RATE function { of: TIME other_robot: 3 linear { } } }",
+       "e.txtpb:2:59: other_robot has no effect here; it goes with NEIGHBOURS, NEAREST, DENSITY and "
+       "NEAREST_BEARING"},
       {"effect { name: 'a' acts_on: TURN_RATE function { of: DENSITY radius_mm: 5 toward_deg: 2 linear { } } }",
        "e.txtpb:2:75: toward_deg has no effect here; it goes with a focus above 0"},
       {"effect { name: 'a' acts_on: TURN_RATE function { of: NEIGHBOURS radius_mm: 5 focus: 2 table { } } }",

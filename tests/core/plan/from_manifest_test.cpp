@@ -54,6 +54,7 @@ TEST(FromManifest, EveryCovariateOfTheSchemaHasAnEnumerator) {
       {F::PREVIOUS_LASTED, Covariate::kPreviousLasted},
       {F::SINCE_REST, Covariate::kSinceRest},
       {F::MOTOR_TIME_DIFFERENCE, Covariate::kMotorTimeDifference},
+      {F::MOTOR_TIME_SUM, Covariate::kMotorTimeSum},
       {F::EARLIER_TURN, Covariate::kEarlierTurn},
       {F::COMMAND_COUNT, Covariate::kCommandCount}};
   ASSERT_EQ(static_cast<int>(pairs.size()), F::Covariate_descriptor()->value_count());

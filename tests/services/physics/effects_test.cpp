@@ -256,12 +256,33 @@ TEST(Effects, NeighbourCovariatesMatchTheirDefinitions) {
               1e-6);
   EXPECT_NEAR(value("DENSITY", start, "focus: 1 toward_deg: 90"),
               weight(50) * share(90) + weight(70) + weight(99) * share(61.3521), 1e-6);
+  // All robots are at rest. Robots 2 and 3 stand at 70 and 99 mm.
+  EXPECT_EQ(value("NEIGHBOURS", start, "others: DRIVEN_OTHERS"), 0);
+  EXPECT_NEAR(value("NEIGHBOURS", start, "others: RESTING_OTHERS"), 3, 1e-8);
+  EXPECT_NEAR(value("NEAREST", start, "others: DRIVEN_OTHERS"), 100, 1e-8);
+  EXPECT_NEAR(value("DENSITY", start, "other_robot: 3 other_robot: 2"), weight(70) + weight(99), 1e-8);
+  EXPECT_NEAR(value("NEAREST", start, "other_robot: 3"), 99, 1e-8);
+  EXPECT_NEAR(value("NEAREST_BEARING", start, "other_robot: 2"), kPi / 2, 1e-7);
   const std::vector<ScenePose> fewer = {start[0], start[2], start[4]};
   EXPECT_NEAR(value("NEAREST_BEARING", fewer), kPi / 2, 1e-7);
   const std::vector<ScenePose> alone = {start[0], start[4]};
   EXPECT_EQ(value("NEIGHBOURS", alone), 0);
   EXPECT_NEAR(value("NEAREST", alone), 100, 1e-8);
   EXPECT_EQ(value("NEAREST_BEARING", alone), 0);
+}
+
+TEST(Effects, NeighboursThatDriveCountFromTheirFirstTick) {
+  const RunPlan plan =
+      make_plan(kQuiet + "effect { name: 'e' acts_on: WORLD_DRIFT robot: 0 during: STOP function { " +
+                    thousandth("NEIGHBOURS", "radius_mm: 100 others: DRIVEN_OTHERS") + " } }",
+                {{0, 0, 0}, {60, 0, 0}, {-70, 0, 0}});
+  Swarm swarm(plan);
+  swarm.set_motors(2, 70, 0);
+  EXPECT_NEAR(1000 * seen(swarm), 1, 1e-8);
+  swarm.set_motors(1, 70, 70);
+  EXPECT_NEAR(1000 * seen(swarm), 2, 1e-8);
+  swarm.set_motors(2, 0, 0);
+  EXPECT_NEAR(1000 * seen(swarm), 1, 1e-8);
 }
 
 TEST(Effects, EpisodesHaveTheStatedRateAndDuration) {
