@@ -43,6 +43,7 @@ class Covariates {
     std::uint32_t focus = 0;
     std::uint32_t field = 0;
     std::uint32_t slot = 0;  ///< of the memory, for covariates that are stored there
+    MovingPointSettings point = {};
     std::vector<double> values;
   };
 

@@ -44,7 +44,16 @@ enum class Covariate : std::uint8_t {
   kSinceRest,
   kMotorTimeDifference,
   kEarlierTurn,
-  kCommandCount
+  kCommandCount,
+  kPointDistance
+};
+
+/// The centre of circles that move and grow. A circle of constant kPointDistance c has the radius c + growth_mm_s t.
+struct MovingPointSettings {
+  double x_mm = 0, y_mm = 0;  ///< at the start of the run
+  double velocity_x_mm_s = 0, velocity_y_mm_s = 0, growth_mm_s = 0;
+
+  bool operator==(const MovingPointSettings&) const = default;
 };
 
 struct ConstantShape {
@@ -88,6 +97,7 @@ struct FunctionSettings {
   double forget_s = 0;
   std::uint32_t focus = 0;
   double toward_deg = 0;
+  MovingPointSettings point;  ///< with kPointDistance
   std::variant<ConstantShape, LinearShape, ExponentialShape, HarmonicShape, SplineShape, Spline2dShape, StepsShape,
                TableShape, NoiseShape, EpisodesShape>
       shape;

@@ -352,6 +352,8 @@ FunctionSettings settings_of(const proto::Function& function) {
   out.forget_s = function.forget_s();
   out.focus = function.focus();
   out.toward_deg = function.toward_deg();
+  const proto::MovingPoint& point = function.point();
+  out.point = {point.x_mm(), point.y_mm(), point.velocity_x_mm_s(), point.velocity_y_mm_s(), point.growth_mm_s()};
   out.shape = shape_of(function);
   return out;
 }
