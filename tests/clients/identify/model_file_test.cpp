@@ -86,6 +86,8 @@ std::vector<Form> forms() {
   of_time.first = 0;
   Factor twice = over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 1);
   twice.first = 2;
+  Factor circles = over(Shape::kCosines, Covariate::kPointDistance, -60, 400, 4);
+  circles.axis.point = {40, -30, 5, -2, 3};
   Factor growing = known;
   growing.plus = 0.5;
   return {
@@ -143,7 +145,8 @@ std::vector<Form> forms() {
        {{over(Shape::kTable, Covariate::kRobot, 0, 1, 1, {3, 5}),
          over(Shape::kLinear, Covariate::kTime, 0, 15, 1)}}},
       {"earlier turn", {{over(Shape::kTable, Covariate::kEarlierTurn, 0, 1, 1, {2, 3})}}},
-      {"number of commands", {{over(Shape::kCosines, Covariate::kCommandCount, 0, 9, 4)}}}};
+      {"number of commands", {{over(Shape::kCosines, Covariate::kCommandCount, 0, 9, 4)}}},
+      {"distance from a moving centre", {{circles}}}};
 }
 
 const char* name_of(Target target) {
