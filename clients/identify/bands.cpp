@@ -28,6 +28,11 @@ std::optional<Situation> situation_at(const Axis& axis, double value) {
     case Covariate::kTime: s.time_s = value; return s;
     case Covariate::kX: s.x_mm = value; return s;
     case Covariate::kY: s.y_mm = value; return s;
+    case Covariate::kPointDistance:
+      if (value < 0) return std::nullopt;
+      s.x_mm = axis.point.x_mm + value;
+      s.y_mm = axis.point.y_mm;
+      return s;
     case Covariate::kHeading: s.heading_rad = value; return s;
     case Covariate::kSinceCommand: s.commands.since_s = value; return s;
     case Covariate::kSinceRest: s.commands.since_rest_s = value; return s;

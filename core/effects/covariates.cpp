@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/base/error.hpp"
+#include "core/effects/motion_change.hpp"
 #include "core/math/elementary.h"
 
 namespace kilotwin {
@@ -56,6 +57,7 @@ Covariates::Covariates(const RunPlan& plan) : plan_(plan) {}
 std::uint32_t Covariates::need(Covariate covariate, const FunctionSettings& function) {
   Column column;
   column.covariate = covariate;
+  if (covariate == Covariate::kPointDistance) column.point = function.point;
   if (is_of_neighbours(covariate)) {
     column.radius_mm = function.radius_mm;
     column.others = function.others;
@@ -81,7 +83,7 @@ std::uint32_t Covariates::need(Covariate covariate, const FunctionSettings& func
     const Column& known = columns_[i];
     if (known.covariate == covariate && known.radius_mm == column.radius_mm && known.forget_s == column.forget_s &&
         known.focus == column.focus && known.toward_rad == column.toward_rad && known.field == column.field &&
-        known.others == column.others && known.other_robots == column.other_robots) {
+        known.others == column.others && known.other_robots == column.other_robots && known.point == column.point) {
       return i;
     }
   }
@@ -109,6 +111,14 @@ Range Covariates::range(std::uint32_t index) const {
     case Covariate::kX: return {-x_mm, x_mm};
     case Covariate::kY: return {-y_mm, y_mm};
     case Covariate::kRadius: return {0, __builtin_sqrt(x_mm * x_mm + y_mm * y_mm)};
+    case Covariate::kPointDistance: {
+      const MovingPointSettings& p = column.point;
+      const double away_x_mm = x_mm + magnitude(p.x_mm) + magnitude(p.velocity_x_mm_s) * duration_s,
+                   away_y_mm = y_mm + magnitude(p.y_mm) + magnitude(p.velocity_y_mm_s) * duration_s,
+                   growth_mm = p.growth_mm_s * duration_s;
+      return {-std::max(growth_mm, 0.0),
+              __builtin_sqrt(away_x_mm * away_x_mm + away_y_mm * away_y_mm) - std::min(growth_mm, 0.0)};
+    }
     case Covariate::kHeading:
     case Covariate::kNearestBearing: return {-kPi, kPi};
     case Covariate::kCommand:
@@ -174,6 +184,15 @@ void Covariates::fill(Column& column, Tick now, const RobotColumns& robots, std:
       return each([&](std::size_t r) {
         return __builtin_sqrt(robots.x_mm[r] * robots.x_mm[r] + robots.y_mm[r] * robots.y_mm[r]);
       });
+    case Covariate::kPointDistance: {
+      const MovingPointSettings& p = column.point;
+      const double time_s = plan_.tick_length.seconds_at(now), centre_x_mm = p.x_mm + p.velocity_x_mm_s * time_s,
+                   centre_y_mm = p.y_mm + p.velocity_y_mm_s * time_s;
+      return each([&](std::size_t r) {
+        const double dx = robots.x_mm[r] - centre_x_mm, dy = robots.y_mm[r] - centre_y_mm;
+        return __builtin_sqrt(dx * dx + dy * dy) - p.growth_mm_s * time_s;
+      });
+    }
     case Covariate::kHeading: return each([&](std::size_t r) { return robots.heading_rad[r]; });
     case Covariate::kCommand:
       return each([&](std::size_t r) { return static_cast<double>(command_of(robots.duties[r])); });

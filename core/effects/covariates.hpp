@@ -45,6 +45,7 @@ class Covariates {
     std::vector<std::uint32_t> other_robots;  ///< ascending; empty: all
     std::uint32_t field = 0;
     std::uint32_t slot = 0;  ///< of the memory, for covariates that are stored there
+    MovingPointSettings point = {};
     std::vector<double> values;
   };
 

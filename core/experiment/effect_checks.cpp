@@ -168,6 +168,11 @@ class EffectCheck {
     demand(of_place == function.has_field(), function.has_field() ? path + ".field" : path,
            function.has_field() ? "field has no effect here; it goes with of: PLACE"
                                 : "field is missing; state the name of an arena field, field: \"...\"");
+    const bool of_point = any([](Function::Covariate c) { return c == Function::POINT_DISTANCE; });
+    demand(of_point == function.has_point(), function.has_point() ? path + ".point" : path,
+           function.has_point()
+               ? "point has no effect here; it goes with of: POINT_DISTANCE"
+               : "point is missing; state the centre of the circles, point { x_mm: ... y_mm: ... }");
     demand(!of_place || fields_.contains(function.field()), path + ".field",
            fmt::format("there is no arena field \"{}\"; add field {{ name: \"{}\" }}, or name one that is there",
                        one_line(function.field(), 60), one_line(function.field(), 60)));

@@ -45,7 +45,16 @@ enum class Covariate : std::uint8_t {
   kMotorTimeDifference,
   kEarlierTurn,
   kCommandCount,
-  kMotorTimeSum
+  kMotorTimeSum,
+  kPointDistance
+};
+
+/// The centre of circles that move and grow. A circle of constant kPointDistance c has the radius c + growth_mm_s t.
+struct MovingPointSettings {
+  double x_mm = 0, y_mm = 0;  ///< at the start of the run
+  double velocity_x_mm_s = 0, velocity_y_mm_s = 0, growth_mm_s = 0;
+
+  bool operator==(const MovingPointSettings&) const = default;
 };
 
 /// Other robots that count as neighbours, by what they do in the coming tick.
@@ -94,7 +103,8 @@ struct FunctionSettings {
   double toward_deg = 0;
   Others others = Others::kAny;
   std::vector<std::uint32_t>
-      other_robots;  ///< numbers of the only robots that count as neighbours, ascending; empty: all
+      other_robots;           ///< numbers of the only robots that count as neighbours, ascending; empty: all
+  MovingPointSettings point;  ///< with kPointDistance
   std::variant<ConstantShape, LinearShape, ExponentialShape, HarmonicShape, SplineShape, Spline2dShape, StepsShape,
                TableShape, NoiseShape, EpisodesShape>
       shape;

@@ -355,6 +355,8 @@ FunctionSettings settings_of(const proto::Function& function) {
   out.others = static_cast<Others>(function.others());
   out.other_robots = {function.other_robot().begin(), function.other_robot().end()};
   std::sort(out.other_robots.begin(), out.other_robots.end());
+  const proto::MovingPoint& point = function.point();
+  out.point = {point.x_mm(), point.y_mm(), point.velocity_x_mm_s(), point.velocity_y_mm_s(), point.growth_mm_s()};
   out.shape = shape_of(function);
   return out;
 }

@@ -48,6 +48,7 @@ std::size_t Factor::columns() const {
     case Shape::kExponential:
     case Shape::kLevelling: return points.size();
     case Shape::kWave: return 2 * points.size();
+    case Shape::kPointShift: return 5;
   }
   return 0;
 }
@@ -130,6 +131,7 @@ void Factor::evaluate_columns(const Situation& s, std::size_t wheel, double* to)
       to[0] = (1 - y) * ((1 - x) * at[0] + x * at[1]) + y * ((1 - x) * at[columns] + x * at[columns + 1]);
       return;
     }
+    case Shape::kPointShift: shifted(c, s, to); return;
     case Shape::kWave:
       for (std::size_t i = 0; i < points.size(); ++i) {
         to[2 * i] = std::cos(2 * M_PI * c / points[i]);
@@ -137,6 +139,24 @@ void Factor::evaluate_columns(const Situation& s, std::size_t wheel, double* to)
       }
       return;
   }
+}
+
+void Factor::shifted(double c, const Situation& s, double* to) const {
+  const double u = (c - low) / (high - low), dx = s.x_mm - axis.point.x_mm_at(s.time_s),
+               dy = s.y_mm - axis.point.y_mm_at(s.time_s), distance = std::max(std::hypot(dx, dy), 1e-6);
+  double slope = 0;  // per mm; 0 beyond the range, where the curve is constant
+  if (u > 0 && u < 1) {
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const double wave = M_PI * (first + static_cast<double>(k));
+      slope -= points[k] * wave * std::sin(wave * u) / (high - low);
+    }
+  }
+  const double time = s.time_s / count;
+  to[0] = -slope * dx / distance;
+  to[1] = -slope * dy / distance;
+  to[2] = to[0] * time;
+  to[3] = to[1] * time;
+  to[4] = -slope * time;
 }
 
 std::vector<double> Factor::roughness() const {

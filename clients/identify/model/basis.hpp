@@ -24,6 +24,9 @@ struct Factor {
     kWave,          ///< cos and sin of 2 pi c / point, two columns per point
     /// cos(k p), sin(k p), k = first.., with the phase p = points[0] x + points[1] y - points[2] t, in rad, mm and s
     kTravelling,
+    /// Derivatives of the curve sum of points[k] cos((first + k) pi u) over kPointDistance by the numbers of its point: x, y,
+    /// velocity_x, velocity_y, growth; five columns, the last three over a unit of `count` s
+    kPointShift,
   };
   Shape shape = Shape::kLinear;
   Axis axis, and_axis;
@@ -50,6 +53,8 @@ struct Factor {
 
  private:
   void evaluate_columns(const Situation&, std::size_t wheel, double* to) const;
+  /// kPointShift. `c`: the distance.
+  void shifted(double c, const Situation&, double* to) const;
 };
 
 /// The products of the columns of all factors. Without factors: one column of ones.

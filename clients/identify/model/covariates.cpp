@@ -103,6 +103,9 @@ double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
     case Covariate::kTraffic: return s.near.traffic[axis.radius];
     case Covariate::kRobot: return s.robot;
     case Covariate::kRun: return s.run;
+    case Covariate::kPointDistance:
+      return std::hypot(s.x_mm - axis.point.x_mm_at(s.time_s), s.y_mm - axis.point.y_mm_at(s.time_s)) -
+             axis.point.growth_mm_s * s.time_s;
   }
   return 0;
 }

@@ -83,6 +83,17 @@ enum class Covariate : std::uint8_t {
   kTraffic,              ///< of the floor cell, as NeighbourView::traffic
   kRobot,
   kRun,
+  kPointDistance,  ///< distance from Axis::point, less its growth
+};
+
+/// The centre of circles that move and grow; see MovingPoint in idl/effects.proto.
+struct MovingPoint {
+  double x_mm = 0, y_mm = 0;  ///< at the start of the run
+  double velocity_x_mm_s = 0, velocity_y_mm_s = 0, growth_mm_s = 0;
+
+  [[nodiscard]] double x_mm_at(double time_s) const { return x_mm + velocity_x_mm_s * time_s; }
+  [[nodiscard]] double y_mm_at(double time_s) const { return y_mm + velocity_y_mm_s * time_s; }
+  bool operator==(const MovingPoint&) const = default;
 };
 
 /// Value of kPreviousCommand under the first command. The simulator uses a stop there.
@@ -101,6 +112,8 @@ struct Axis {
   /// For neighbours up to kListed_mm: the robots that count.
   Others others = Others::kAny;
   std::uint32_t only_robot = 0;  ///< 1 + number of the only robot that counts; 0: all
+  /// For kPointDistance.
+  MovingPoint point = {};
 
   bool operator==(const Axis&) const = default;
 };

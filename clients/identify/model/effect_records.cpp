@@ -42,6 +42,7 @@ Function::Covariate covariate_of(Covariate c) {
     case Covariate::kTraffic: return Function::PLACE;
     case Covariate::kRobot: return Function::ROBOT;
     case Covariate::kRun: return Function::RUN;
+    case Covariate::kPointDistance: return Function::POINT_DISTANCE;
   }
   return Function::NOTHING;
 }
@@ -79,6 +80,13 @@ Situation with(const Axis& axis, double value, Situation s = {}) {
       s.near.nearest_mm = 0;
       s.near.direction_rad = value;
       break;
+    case Covariate::kPointDistance: {
+      // A negative distance occurs after the circle has grown only.
+      if (value < 0 && axis.point.growth_mm_s > 0) s.time_s = -value / axis.point.growth_mm_s;
+      s.x_mm = axis.point.x_mm_at(s.time_s) + std::max(value, 0.0);
+      s.y_mm = axis.point.y_mm_at(s.time_s);
+      break;
+    }
     default: break;
   }
   return s;
@@ -101,6 +109,15 @@ void set_axis(Function& function, const Factor& factor) {
   if (factor.axis.focus > 0) {
     function.set_focus(factor.axis.focus);
     if (factor.axis.toward_deg != 0) function.set_toward_deg(factor.axis.toward_deg);
+  }
+  if (factor.axis.of == Covariate::kPointDistance) {
+    const MovingPoint& from = factor.axis.point;
+    proto::MovingPoint& point = *function.mutable_point();
+    point.set_x_mm(rounded(from.x_mm));
+    point.set_y_mm(rounded(from.y_mm));
+    point.set_velocity_x_mm_s(rounded(from.velocity_x_mm_s));
+    point.set_velocity_y_mm_s(rounded(from.velocity_y_mm_s));
+    point.set_growth_mm_s(rounded(from.growth_mm_s));
   }
   if (factor.axis.of == Covariate::kTraffic) function.set_field(field_name(factor.axis.radius));
   if (is_motor_time(factor.axis.of) && factor.axis.decay_index > 0)
@@ -219,6 +236,7 @@ Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) 
     case Shape::kLevelling: set_exponential(function, factor, coefficients); break;
     case Shape::kWave: set_harmonic(function, coefficients[0], coefficients[1], factor.points[0]); break;
     case Shape::kTravelling: break;  // a sum of products
+    case Shape::kPointShift: break;  // part of a fit, of no model
     case Shape::kGrid:
       set_map(function, factor, factor.count, factor.points.size() / factor.count,
               [&](std::size_t i, std::size_t j, double, double) {
@@ -395,6 +413,7 @@ const char* form_of(const Term& term) {
   switch (term.blocks.front().basis.factors.front().shape) {
     case Shape::kLinear: return "linear";
     case Shape::kCosines:
+    case Shape::kPointShift:
     case Shape::kTaper: return "curve";
     case Shape::kCosines2:
     case Shape::kPolynomials2:

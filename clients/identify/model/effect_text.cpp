@@ -56,6 +56,7 @@ Unit unit_of(Function::Covariate of) {
     case Function::X:
     case Function::Y:
     case Function::RADIUS:
+    case Function::POINT_DISTANCE:
     case Function::NEAREST: return {"mm", 1};
     case Function::HEADING:
     case Function::NEAREST_BEARING: return {"degrees", kDegrees};
@@ -82,6 +83,7 @@ const char* name_of(Function::Covariate of) {
     case Function::X: return "x";
     case Function::Y: return "y";
     case Function::RADIUS: return "radius";
+    case Function::POINT_DISTANCE: return "distance from the moving centre";
     case Function::NEAREST: return "nearest";
     case Function::NEAREST_BEARING: return "bearing";
     case Function::HEADING: return "heading";
@@ -231,6 +233,18 @@ Amplitudes without_amplitudes(const std::vector<Effect>& effects) {
   return out;
 }
 
+/// "circle about (-50, 60) mm, moving at (1.2, 0.3) mm/s, radius growing by 1.6 mm/s".
+std::string point_in_words(const proto::MovingPoint& p) {
+  std::string words = fmt::format("circles about ({:.0f}, {:.0f}) mm", p.x_mm(), p.y_mm());
+  if (p.velocity_x_mm_s() != 0 || p.velocity_y_mm_s() != 0)
+    words +=
+        fmt::format(" at the start, moving at ({:.2f}, {:.2f}) mm/s", p.velocity_x_mm_s(), p.velocity_y_mm_s());
+  if (p.growth_mm_s() != 0)
+    words += fmt::format(", {} by {:.2f} mm/s", p.growth_mm_s() > 0 ? "growing" : "shrinking",
+                         std::abs(p.growth_mm_s()));
+  return words;
+}
+
 /// The words that distinguish a record from others of its term: "along y, going straight: ".
 std::string which_of(const Effect& effect) {
   std::vector<std::string> parts;
@@ -241,6 +255,8 @@ std::string which_of(const Effect& effect) {
   if (effect.acts_on() == Effect::BODY_DRIFT || effect.acts_on() == Effect::MEASURED_BODY_OFFSET)
     parts.emplace_back(effect.direction_deg() == 90 ? "to the left" : "ahead");
   if (effect.during_size() == 1) parts.emplace_back(fmt::format("going {}", command_name(effect.during(0))));
+  for (const Function& f : effect.function())
+    if (f.has_point()) parts.push_back(point_in_words(f.point()));
   // With other factors in the product: the value at their full strength.
   for (const Function& f : effect.function()) {
     if (f.focus() > 0)

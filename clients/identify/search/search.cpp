@@ -13,6 +13,8 @@
 #include "clients/identify/search/calibration_shifts.hpp"
 #include "clients/identify/search/central_distortion.hpp"
 #include "clients/identify/search/change_points.hpp"
+#include "clients/identify/search/dictionary_builder.hpp"
+#include "clients/identify/search/moving_circles.hpp"
 #include "clients/identify/search/neighbour_shape.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
 #include "clients/identify/search/simplification.hpp"
@@ -101,7 +103,7 @@ class Loop {
       ++failures_;
     }
     say(kAlternatives, "testing alternatives");
-    return eliminate() || accept_general();
+    return eliminate() || accept_moving_circle() || accept_general();
   }
   /// The limit that the search has reached, in one sentence; empty: none. It then adds nothing more.
   [[nodiscard]] std::string limit() const {
@@ -246,12 +248,14 @@ class Loop {
     std::vector<Dictionary> families = general_;
     if (Dictionary waves = wave_dictionary_of(fitter_, out_.fit, extent_); !waves.hypotheses.empty())
       families.push_back(std::move(waves));
+    const std::vector<MovingCircle> circles = moving_circles_of(fitter_, out_.fit, extent_);
+    if (!circles.empty()) families.push_back(dictionary_of_circles(out_.fit, extent_, circles));
     std::map<std::string, GeneralTerm> best;
     const double least = kRemnant * explained();
     for (const Dictionary& family : families) {
-      // Waves have a form of their own, with a name.
-      const bool waves = &family == &families.back() && families.size() > general_.size();
-      add_candidates(family, !waves, least, best);
+      // Waves and moving circles have a form of their own, with a name.
+      const bool general = static_cast<std::size_t>(&family - families.data()) < general_.size();
+      add_candidates(family, general, least, best);
     }
     std::vector<GeneralTerm> ranked;
     for (auto& [name, one] : best) ranked.push_back(std::move(one));
@@ -297,6 +301,42 @@ class Loop {
     if (periods < kFewestPeriods && stripes < kFewestStripes) return false;
     say(kAddition, "fitting " + wave.term.name);
     return fits(std::move(wave), kWave);
+  }
+  /// Whether a term is an effect of position or time on the speed, and no moving circle itself.
+  [[nodiscard]] bool may_be_part_of_circle(std::size_t t) const {
+    const Reason& reason = out_.reasons[t];
+    return reason.acts_on == kSpeed.in_words && !is_moving_circle(out_.fit.model.terms[t]) &&
+           std::all_of(reason.covariates.begin(), reason.covariates.end(),
+                       [](const std::string& of) { return of == "position" || of == "time"; });
+  }
+  /// Effects of position and of time can be proxies of a circle that moves or grows: tries one in place of all of them. It stays
+  /// if the evidence of the whole model is larger.
+  bool accept_moving_circle() {
+    // One amplitude within a circle explains less than its curve: the share of what the other terms explain that is worth a fit.
+    constexpr double kLeastShare = 0.5;
+    std::string key = "circle for";
+    for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t)
+      if (may_be_part_of_circle(t)) key += " " + out_.fit.model.terms[t].name;
+    if (key == "circle for" || !limit().empty() || !failed_.insert(key).second) return false;
+    const Search before = out_;
+    const double evidence = fitter_.log_evidence(out_.fit), likelihood = fitter_.log_likelihood_of_all(out_.fit);
+    for (std::size_t t = out_.fit.model.terms.size(); t-- > 0;) {
+      if (!may_be_part_of_circle(t)) continue;
+      out_.fit.model.terms.erase(out_.fit.model.terms.begin() + static_cast<std::ptrdiff_t>(t));
+      out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(t));
+    }
+    fitter_.fit(out_.fit, 2);
+    const double explained = likelihood - fitter_.log_likelihood_of_all(out_.fit);
+    const std::vector<MovingCircle> circles = moving_circles_of(fitter_, out_.fit, extent_);
+    if (!circles.empty() && circles.front().gain > kLeastShare * explained) {
+      std::map<std::string, GeneralTerm> best;
+      add_candidates(dictionary_of_circles(out_.fit, extent_, circles), false, kLeastShare * explained, best);
+      if (!best.empty() && fits(std::move(best.begin()->second), key) &&
+          fitter_.log_evidence(out_.fit) > evidence + kClose)
+        return true;
+    }
+    out_ = before;
+    return false;
   }
   /// Adds the general term with the most evidence that fits, if much is left unexplained. Returns whether there is one.
   bool accept_general() {
@@ -420,6 +460,11 @@ class Loop {
     if (became_switch(place)) return;
     const std::string before = out_.fit.model.terms[place].name;
     if (refine_wave_numbers(fitter_, out_.fit, place)) refit(fitter_, out_.fit, place);
+    if (refine_moving_circle(fitter_, out_.fit, place)) {
+      // The curve is sharper about the right centre.
+      refine_curves(fitter_, out_.fit, place);
+      if (refine_moving_circle(fitter_, out_.fit, place)) refit(fitter_, out_.fit, place);
+    }
     const std::string name = find_change_points(fitter_, out_.fit, place);
     if (name != before) {
       for (const Hypothesis& h : dictionary_.hypotheses) {

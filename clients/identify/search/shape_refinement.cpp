@@ -32,6 +32,7 @@ Factor richer(Factor f) {
       switch (f.axis.of) {
         case Covariate::kTime: f.count = 64; break;
         case Covariate::kX:
+        case Covariate::kPointDistance:
         case Covariate::kY: f.count = 40; break;
         case Covariate::kNeighbours: f.count = 8; break;
         case Covariate::kSinceCommand:
@@ -58,6 +59,7 @@ Factor richer(Factor f) {
       f.points.clear();
       break;
     case Shape::kTable:
+    case Shape::kPointShift:
     case Shape::kLevelling:
     case Shape::kGrid:
     case Shape::kWave: break;

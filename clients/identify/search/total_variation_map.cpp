@@ -20,6 +20,12 @@ constexpr std::size_t kFolds = 4;
 /// Least cross-validated gain in log likelihood.
 constexpr double kLeastMapEvidence = 15;
 
+/// Size of a usual effect on the target over that of a gain: maps are fitted in this unit, so that one penalty serves all targets.
+double unit_of(Target target) {
+  constexpr double kTurn_rad_s = 0.25;
+  return target == Target::kTurn ? kTurn_rad_s : 1;
+}
+
 /// Normal equations of the nodes near a robot's path, from the innovations.
 class FineSums {
  public:
@@ -33,11 +39,7 @@ class FineSums {
     in_contact_ = in_contact_ || record.in_contact();
     const int command = static_cast<int>(record.middle.commands.command);
     if (!record.middle.commands.driven() || (map_.during >> command & 1) == 0) return;
-    double own = 0;
-    map_.basis.evaluate(record.middle, 0, &own);
-    const double factor = std::max(0.05, std::abs(1 + own));
-    const Eigen::Vector3d force = record.h_s / factor * ways.by_wheel *
-                                  Eigen::Vector2d(r.left_base_mm_s * r.left_gain, r.right_base_mm_s * r.right_gain);
+    const Eigen::Vector3d force = record.h_s * ways.by_wheel * by_value(record, r);
     const NodeGrid& g = to_.grid;
     const double u = std::clamp((record.middle.x_mm - g.x_mm) / g.pitch_mm, 0.0, g.columns - 1.001),
                  v = std::clamp((record.middle.y_mm - g.y_mm) / g.pitch_mm, 0.0, g.rows - 1.001);
@@ -76,6 +78,15 @@ class FineSums {
     int i, j;
     Eigen::Vector3d pose, seen = Eigen::Vector3d::Zero();
   };
+  /// Change of the wheels' speeds by the value of a node, mm/s per unit.
+  [[nodiscard]] Eigen::Vector2d by_value(const StepRecord& record, const Rates& r) const {
+    const double unit = unit_of(map_.target), half_base_mm = model_.base.wheel_base_mm / 2;
+    if (map_.target == Target::kTurn) return {-half_base_mm * unit, half_base_mm * unit};
+    double own = 0;
+    map_.basis.evaluate(record.middle, 0, &own);
+    const double factor = std::max(0.05, std::abs(1 + own));
+    return {r.left_base_mm_s * r.left_gain / factor, r.right_base_mm_s * r.right_gain / factor};
+  }
   void add(int i, int j, const Eigen::Vector3d& force) {
     for (Active& a : active_) {
       if (a.i != i || a.j != j) continue;
@@ -112,8 +123,11 @@ std::vector<NormalEquations> sums_of(const Fitter& fitter, const FitState& state
   return folds;
 }
 
-bool is_map_of_speed(const Block& block) {
-  if (block.target != Target::kGain || block.during != kDriven || block.basis.factors.size() != 1) return false;
+/// Whether a block is a smooth map of the speed or of the turn rate.
+bool is_map(const Block& block) {
+  if ((block.target != Target::kGain && block.target != Target::kTurn) || block.during != kDriven ||
+      block.basis.factors.size() != 1)
+    return false;
   const Factor& f = block.basis.factors.front();
   const bool of_place = f.axis.of == Covariate::kX || f.axis.of == Covariate::kY;
   return of_place && (f.shape == Shape::kCosines2 || f.shape == Shape::kCosines);
@@ -149,7 +163,7 @@ NodeGrid grid_of(const PreparedSet& set) {
   return g;
 }
 
-Block block_of(const NodeGrid& g, const Eigen::VectorXd& f) {
+Block block_of(const NodeGrid& g, Target target, const Eigen::VectorXd& f) {
   Factor factor;
   factor.shape = Shape::kGrid;
   factor.axis.of = Covariate::kX;
@@ -159,19 +173,20 @@ Block block_of(const NodeGrid& g, const Eigen::VectorXd& f) {
   factor.and_low = g.y_mm;
   factor.and_high = g.y_mm + g.pitch_mm * (g.rows - 1);
   factor.count = static_cast<std::uint32_t>(g.columns);
-  factor.points.assign(f.data(), f.data() + f.size());
-  return {Target::kGain, Basis{{factor}}, kDriven};
+  const Eigen::VectorXd values = unit_of(target) * f;
+  factor.points.assign(values.data(), values.data() + values.size());
+  return {target, Basis{{factor}}, kDriven};
 }
 
 /// The term with the fine map in place of its smooth ones.
-Term with_map(const Term& term, const NodeGrid& grid, const Eigen::VectorXd& f) {
+Term with_map(const Term& term, const NodeGrid& grid, Target target, const Eigen::VectorXd& f) {
   Term out = term;
   out.blocks.clear();
   std::vector<double> coefficients, precision;
   Eigen::Index first = 0;
   for (const Block& block : term.blocks) {
     const auto n = static_cast<Eigen::Index>(block.basis.size());
-    if (!is_map_of_speed(block)) {
+    if (!is_map(block) || block.target != target) {
       out.blocks.push_back(block);
       for (Eigen::Index i = first; i < first + n; ++i) {
         coefficients.push_back(term.coefficients[i]);
@@ -180,7 +195,7 @@ Term with_map(const Term& term, const NodeGrid& grid, const Eigen::VectorXd& f) 
     }
     first += n;
   }
-  out.blocks.insert(out.blocks.begin(), block_of(grid, f));
+  out.blocks.insert(out.blocks.begin(), block_of(grid, target, f));
   coefficients.insert(coefficients.begin(), 1.0);
   precision.insert(precision.begin(), 0.01);
   out.coefficients =
@@ -190,7 +205,7 @@ Term with_map(const Term& term, const NodeGrid& grid, const Eigen::VectorXd& f) 
 }
 
 /// Sum of the term's smooth maps at the nodes.
-Eigen::VectorXd sampled(const Term& term, const NodeGrid& grid) {
+Eigen::VectorXd sampled(const Term& term, const NodeGrid& grid, Target target) {
   Eigen::VectorXd f(static_cast<Eigen::Index>(grid.nodes()));
   std::array<double, kMostColumns> values;
   Situation s;
@@ -198,17 +213,21 @@ Eigen::VectorXd sampled(const Term& term, const NodeGrid& grid) {
     for (int i = 0; i < grid.columns; ++i) {
       s.x_mm = grid.x_mm + i * grid.pitch_mm;
       s.y_mm = grid.y_mm + j * grid.pitch_mm;
-      double gain = 1;
+      double gain = 1, sum = 0;
       Eigen::Index first = 0;
       for (const Block& block : term.blocks) {
         const auto n = static_cast<Eigen::Index>(block.basis.size());
-        if (is_map_of_speed(block)) {
+        if (is_map(block) && block.target == target) {
           block.basis.evaluate(s, 0, values.data());
-          gain *= 1 + term.coefficients.segment(first, n).dot(Eigen::Map<const Eigen::VectorXd>(values.data(), n));
+          const double own =
+              term.coefficients.segment(first, n).dot(Eigen::Map<const Eigen::VectorXd>(values.data(), n));
+          gain *= 1 + own;
+          sum += own;
         }
         first += n;
       }
-      f[static_cast<Eigen::Index>(grid.at(i, j))] = gain - 1;
+      // Gains multiply, turn rates add up.
+      f[static_cast<Eigen::Index>(grid.at(i, j))] = target == Target::kGain ? gain - 1 : sum / unit_of(target);
     }
   }
   return f;
@@ -217,6 +236,7 @@ Eigen::VectorXd sampled(const Term& term, const NodeGrid& grid) {
 /// A fitted map.
 struct Fitted {
   NodeGrid grid;
+  Target target;
   Eigen::VectorXd f;
   Variation by;
 };
@@ -257,7 +277,7 @@ double choose(const std::vector<NormalEquations>& folds, const NormalEquations& 
 
 /// Doubles the resolution by interpolation.
 void halve(Fitted& map) {
-  const Block coarse = block_of(map.grid, map.f);
+  const Block coarse = block_of(map.grid, map.target, map.f);
   map.grid.pitch_mm /= 2;
   map.grid.columns = 2 * map.grid.columns - 1;
   map.grid.rows = 2 * map.grid.rows - 1;
@@ -270,19 +290,22 @@ void halve(Fitted& map) {
       coarse.basis.evaluate(s, 0, &map.f[static_cast<Eigen::Index>(map.grid.at(i, j))]);
     }
   }
+  map.f /= unit_of(map.target);
 }
 
 }  // namespace
 
 void fit_total_variation_map(const Fitter& fitter, FitState& state, std::size_t place) {
   const std::vector<Block>& had = state.model.terms[place].blocks;
-  if (std::none_of(had.begin(), had.end(), is_map_of_speed)) return;
+  const auto first = std::find_if(had.begin(), had.end(), is_map);
+  if (first == had.end()) return;
   Fitted map;
+  map.target = first->target;
   map.grid = grid_of(state.tracks);
   if (map.grid.columns < 8 || map.grid.rows < 8) return;
-  map.f = sampled(state.model.terms[place], map.grid);
+  map.f = sampled(state.model.terms[place], map.grid, map.target);
   FitState trial = state;
-  trial.model.terms[place] = with_map(state.model.terms[place], map.grid, map.f);
+  trial.model.terms[place] = with_map(state.model.terms[place], map.grid, map.target, map.f);
   double likelihood = fitter.log_likelihood(state);
   constexpr int kPasses = 3;
   constexpr int kMostNodes = 190;
@@ -290,7 +313,7 @@ void fit_total_variation_map(const Fitter& fitter, FitState& state, std::size_t 
     const bool finer = pass == 2 && std::max(map.grid.columns, map.grid.rows) * 2 - 1 < kMostNodes;
     if (finer) {
       halve(map);
-      trial.model.terms[place].blocks.front() = block_of(map.grid, map.f);
+      trial.model.terms[place].blocks.front() = block_of(map.grid, map.target, map.f);
     }
     const std::vector<NormalEquations> folds =
         sums_of(fitter, trial, trial.model.terms[place].blocks.front(), map.grid);
@@ -314,10 +337,10 @@ void fit_total_variation_map(const Fitter& fitter, FitState& state, std::size_t 
     }
     map.f = solve(all, map.f, map.by, {6, 30});
     FitState next = trial;
-    next.model.terms[place].blocks.front() = block_of(map.grid, map.f);
+    next.model.terms[place].blocks.front() = block_of(map.grid, map.target, map.f);
     fitter.fit(next, 1);
     map.f *= next.model.terms[place].coefficients[0];
-    next.model.terms[place].blocks.front() = block_of(map.grid, map.f);
+    next.model.terms[place].blocks.front() = block_of(map.grid, map.target, map.f);
     next.model.terms[place].coefficients[0] = 1;
     const double found = fitter.log_likelihood(next);
     if (found < likelihood + kLeastMapEvidence) break;

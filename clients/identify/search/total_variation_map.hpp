@@ -5,8 +5,8 @@
 
 namespace kilotwin::identify {
 
-/// Replaces a term's smooth map of the speed over the floor by values on a fine grid with a total variation prior
-/// (Rudin, Osher, Fatemi 1992), which preserves edges. Only if the cross-validated likelihood over robots rises.
+/// Replaces a term's smooth map of the speed or the turn rate by values on a fine grid. Their total variation prior (Rudin, Osher,
+/// Fatemi 1992) preserves edges. Only if the cross-validated likelihood over robots rises.
 void fit_total_variation_map(const Fitter&, FitState&, std::size_t term);
 
 }  // namespace kilotwin::identify

@@ -92,6 +92,8 @@ std::vector<Form> forms() {
   of_time.first = 0;
   Factor twice = over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 1);
   twice.first = 2;
+  Factor circles = over(Shape::kCosines, Covariate::kPointDistance, -60, 400, 4);
+  circles.axis.point = {40, -30, 5, -2, 3};
   Factor growing = known;
   growing.plus = 0.5;
   return {
@@ -157,7 +159,8 @@ std::vector<Form> forms() {
        {{among(over(Shape::kCosines, Covariate::kDensity, 0, 4, 2), Others::kResting, 0)}}},
       {"distance of one robot", {{among(over(Shape::kTaper, Covariate::kNearest, 0, 150, 2), Others::kAny, 5)}}},
       {"distance of one driven robot",
-       {{among(over(Shape::kTaper, Covariate::kNearest, 0, 150, 2), Others::kDriven, 7)}}}};
+       {{among(over(Shape::kTaper, Covariate::kNearest, 0, 150, 2), Others::kDriven, 7)}}},
+      {"distance from a moving centre", {{circles}}}};
 }
 
 const char* name_of(Target target) {

@@ -33,6 +33,15 @@ TEST_F(ValidateEffects, TablesTakeCommandsAndTheirNumber) {
   }
 }
 
+TEST_F(ValidateEffects, DistancesNeedTheirPoint) {
+  const std::string head = kRobots + "effect { name: 'a' acts_on: WHEEL_GAIN\n function { ";
+  EXPECT_EQ(check_error(head + "of: POINT_DISTANCE point { x_mm: 50 growth_mm_s: 2 } linear { } } }"), "");
+  EXPECT_EQ(check_error(head + "of: POINT_DISTANCE linear { } } }"),
+            "e.txtpb:3:2: point is missing; state the centre of the circles, point { x_mm: ... y_mm: ... }");
+  EXPECT_EQ(check_error(head + "of: X point { x_mm: 50 } linear { } } }"),
+            "e.txtpb:3:19: point has no effect here; it goes with of: POINT_DISTANCE");
+}
+
 TEST_F(ValidateEffects, EpisodesNeedRateAndLength) {
   const std::string head =
       kRobots + "effect { name: 'a' acts_on: WHEEL_GAIN function { constant: -1 }\n function { ";

@@ -56,7 +56,8 @@ TEST(FromManifest, EveryCovariateOfTheSchemaHasAnEnumerator) {
       {F::MOTOR_TIME_DIFFERENCE, Covariate::kMotorTimeDifference},
       {F::MOTOR_TIME_SUM, Covariate::kMotorTimeSum},
       {F::EARLIER_TURN, Covariate::kEarlierTurn},
-      {F::COMMAND_COUNT, Covariate::kCommandCount}};
+      {F::COMMAND_COUNT, Covariate::kCommandCount},
+      {F::POINT_DISTANCE, Covariate::kPointDistance}};
   ASSERT_EQ(static_cast<int>(pairs.size()), F::Covariate_descriptor()->value_count());
   for (const auto& [schema, plain] : pairs) {
     F function;

@@ -285,6 +285,24 @@ TEST(Effects, NeighboursThatDriveCountFromTheirFirstTick) {
   EXPECT_NEAR(1000 * seen(swarm), 1, 1e-8);
 }
 
+TEST(Effects, DistancesFromAMovingPointMatchTheirDefinition) {
+  const std::string function = thousandth(
+      "POINT_DISTANCE", "point { x_mm: -30 y_mm: 40 velocity_x_mm_s: 3 velocity_y_mm_s: -1 growth_mm_s: 2 }");
+  // The function is the drift along y, in mm/s, of a robot that stands at the origin at first.
+  const RunPlan plan =
+      make_plan(kQuiet + "effect { name: 'e' acts_on: WORLD_DRIFT direction_deg: 90 during: STOP function { " +
+                    function + " } }",
+                {{0, 0, 0}});
+  Swarm swarm(plan);
+  double y_mm = 0;
+  for (int k = 0; k < 300; ++k) {
+    const double t = k * kTick_s;
+    EXPECT_NEAR(swarm.poses()[0].y_mm, y_mm, 1e-9) << k;
+    y_mm += kTick_s * (std::hypot(-30 + 3 * t, y_mm - (40 - t)) - 2 * t) / 1000;
+    swarm.run(1);
+  }
+}
+
 TEST(Effects, EpisodesHaveTheStatedRateAndDuration) {
   // 200 robots for 1000 s: mean interval 8 s, mean duration 4 / (3 - 1) s, so an episode is on for a fifth of the time.
   constexpr std::uint32_t kRobots = 200;
