@@ -34,6 +34,11 @@ proto::Model renumbered(const proto::Model& model, const Scene& scene) {
   }
   for (proto::Effect& effect : *out.mutable_effect()) {
     for (proto::Function& function : *effect.mutable_function()) {
+      // An absent robot gets a number that no robot of the scene has: an empty list would mean all robots.
+      for (std::uint32_t& robot : *function.mutable_other_robot()) {
+        const auto place = place_of.find(robot);
+        robot = place != place_of.end() ? place->second : static_cast<std::uint32_t>(scene.robots.size());
+      }
       if (function.of() != proto::Function::ROBOT || !function.has_table()) continue;
       proto::Table table;
       if (function.table().has_otherwise()) table.set_otherwise(function.table().otherwise());

@@ -27,6 +27,8 @@ bool is_own_motors(const std::string& covariate) { return covariate == "DUTY" ||
 /// Parameters that a covariate needs.
 std::string with(const std::string& covariate, const std::string& radius_mm = "80") {
   if (covariate == "PLACE") return " field: 'driven'";
+  if (covariate == "POINT_DISTANCE")
+    return " point { x_mm: 50 y_mm: -20 velocity_x_mm_s: 9 velocity_y_mm_s: -4 growth_mm_s: 6 }";
   const bool of_neighbours = covariate == "NEIGHBOURS" || covariate == "NEAREST" || covariate == "DENSITY" ||
                              covariate == "NEAREST_BEARING";
   return of_neighbours ? " radius_mm: " + radius_mm : "";
@@ -52,6 +54,9 @@ std::string everything() {
     add(target, "of: " + kCovariates[c] + with(kCovariates[c]) + " linear { at_zero: 0.02 slope: 0.0007 }");
   }
   add("TURN_RATE", "of: DENSITY radius_mm: 90 focus: 3 toward_deg: -60 linear { slope: 0.001 }");
+  add("TURN_RATE", "of: NEIGHBOURS radius_mm: 80 others: DRIVEN_OTHERS linear { slope: 0.02 }");
+  add("WHEEL_GAIN", "of: DENSITY radius_mm: 70 others: RESTING_OTHERS linear { slope: -0.05 }");
+  add("BODY_DRIFT", "of: NEAREST radius_mm: 80 other_robot: [7, 3, 60, 90] linear { slope: 0.01 }");
   add("WORLD_DRIFT direction_deg: 45 during: [STOP, LEFT]",
       "of: X and_of: Y spline_2d { knot: [-300, 0, 300] and_knot: [-300, 300] value: [1, -1, 2, 0, 1, -2] }");
   add("TURN_RATE during: [STOP, STRAIGHT]", "noise { sd: 0.1 correlation_s: 2 }");
