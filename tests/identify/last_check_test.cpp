@@ -24,9 +24,9 @@ class LastCheck : public testing::Test {
     FitState state = base_;
     const Dictionary all = dictionary_of(extent_of(base_.tracks), {});
     for (const std::string& name : names) {
-      const auto h = std::find_if(all.hypotheses.rbegin(), all.hypotheses.rend(),
+      const auto h = std::find_if(all.hypotheses.begin(), all.hypotheses.end(),
                                   [&](const Hypothesis& one) { return one.name == name; });
-      EXPECT_NE(h, all.hypotheses.rend()) << name;
+      EXPECT_NE(h, all.hypotheses.end()) << name;
       state.model.terms.push_back(all.term_of(*h, 1));
     }
     fitter_.fit(state, 2);
