@@ -17,7 +17,8 @@ std::pair<std::string, std::string> covariate_words(Covariate covariate) {
     case Covariate::kTime: return {"time", "time"};
     case Covariate::kX:
     case Covariate::kY:
-    case Covariate::kRadius: return {"position", "position"};
+    case Covariate::kRadius:
+    case Covariate::kPointDistance: return {"position", "position"};
     case Covariate::kHeading: return {"heading", "heading"};
     case Covariate::kCommand: return {"command", "command"};
     case Covariate::kSinceCommand: return {"time-since-command", "time_since_command"};
@@ -58,6 +59,9 @@ std::optional<Multiplied> multiplied_by(const Term& term) {
     if (out.is_of(word)) return std::nullopt;
     out.name += (out.name.empty() ? "" : "-and-") + name;
     out.words.push_back(word);
+    if (factor.axis.of != Covariate::kPointDistance) continue;
+    out.name += "-and-time";
+    out.words.emplace_back("time");
   }
   return out;
 }

@@ -296,8 +296,8 @@ bool refine_moving_circle(const Fitter& fitter, FitState& state, std::size_t pla
   }
   changed = set_still(fitter, state, place, likelihood) || changed;
   const MovingPoint& centre = state.model.terms[place].blocks.front().basis.factors.front().axis.point;
-  if (centre.velocity_x_mm_s == 0 && centre.velocity_y_mm_s == 0 && centre.growth_mm_s == 0)
-    state.model.terms[place].name = "speed-by-position";
+  const bool stands = centre.velocity_x_mm_s == 0 && centre.velocity_y_mm_s == 0 && centre.growth_mm_s == 0;
+  state.model.terms[place].name = stands ? "speed-by-position" : "speed-by-position-and-time";
   return changed;
 }
 

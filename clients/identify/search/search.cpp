@@ -53,6 +53,8 @@ constexpr std::size_t kEnoughForGeneral = 70000;
 constexpr std::size_t kMostTries = 4;
 /// Key of a general term among the failed hypotheses.
 constexpr const char* kGeneral = "general ";
+/// The same of a wave or a moving circle, which may have the name of a general term.
+constexpr const char* kForm = "form ";
 /// The same of a wave among named hypotheses.
 constexpr const char* kWave = "wave";
 
@@ -76,7 +78,7 @@ class Loop {
     for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t) {
       simplify(fitter_, out_.fit, t);
       if (!is_constant_drift(out_.fit.model.terms[t])) continue;
-      out_.fit.model.terms[t].name = "drift";
+      note_renamed(std::exchange(out_.fit.model.terms[t].name, "drift"), "drift");
       out_.reasons[t].covariates = {"world_frame"};
     }
     out_.work = out_.fit.tracks.work();
@@ -221,7 +223,7 @@ class Loop {
     Term term;
     Reason reason;
   };
-  /// Adds the hypotheses of a family that pass the tests, of each name the one with the most evidence.
+  /// Adds the hypotheses of a family that pass the tests, of each name the one with the most evidence, by kind and name.
   void add_candidates(const Dictionary& family, bool general, double least_evidence,
                       std::map<std::string, GeneralTerm>& best) {
     std::vector<Block> blocks = blocks_of(out_.fit.model);
@@ -232,14 +234,14 @@ class Loop {
     const ScoreTest::Outcome outcome = test.test(kSeed + 100 + static_cast<std::uint64_t>(round_));
     for (const Finding& f : outcome.findings) {
       const Hypothesis& h = family.hypotheses[f.hypothesis];
-      const auto known = best.find(h.name);
+      const auto known = best.find((general ? kGeneral : kForm) + h.name);
       if (!good(f, outcome.threshold_log10_p) || f.evidence < least_evidence ||
-          failed_.contains(kGeneral + h.name) ||
+          failed_.contains((general ? kGeneral : kForm) + h.name) ||
           (known != best.end() && f.evidence <= known->second.reason.finding.evidence))
         continue;
       GeneralTerm one{family.term_of(h, f.relative_scale), {h.covariates, h.acts_on, f, outcome.threshold_log10_p}};
       one.term.general = general;
-      best.insert_or_assign(h.name, std::move(one));
+      best.insert_or_assign((general ? kGeneral : kForm) + h.name, std::move(one));
     }
   }
   /// Those of all families, in the order of their evidence.
@@ -345,7 +347,7 @@ class Loop {
     if (!leaves_much_(out_.fit)) return false;
     for (GeneralTerm& one : general_candidates()) {
       if (worked_out()) break;
-      const std::string key = kGeneral + one.term.name;
+      const std::string key = (one.term.general ? kGeneral : kForm) + one.term.name;
       if (!fits(std::move(one), key)) continue;
       ++general_terms_;
       --eliminations_;
@@ -413,7 +415,7 @@ class Loop {
       out_.reasons[t].finding.log10_p = std::min(reason.finding.log10_p, out_.reasons[t].finding.log10_p);
       fitter_.fit(out_.fit, 2);
       refine_shape(t);
-      out_.steps.push_back({h.name, found.held_out});
+      out_.steps.push_back({out_.fit.model.terms[t].name, found.held_out});
       return;
     }
     out_.fit.model.terms.push_back(std::move(term));
@@ -447,8 +449,21 @@ class Loop {
     return true;
   }
 
-  /// Refines the shape of a term.
+  /// A term has got the name of another form: steps and ambiguities follow it.
+  void note_renamed(const std::string& from, const std::string& to) {
+    if (from == to) return;
+    for (auto& step : out_.steps)
+      if (step.name == from) step.name = to;
+    for (Ambiguity& one : out_.ambiguous)
+      if (one.found == from) one.found = to;
+  }
+  /// Refines the shape of a term. It may get another name.
   void refine_shape(std::size_t place) {
+    const std::string before = out_.fit.model.terms[place].name;
+    refine_form(place);
+    note_renamed(before, out_.fit.model.terms[place].name);
+  }
+  void refine_form(std::size_t place) {
     if (out_.fit.model.terms[place].general) {
       refit(fitter_, out_.fit, place);
       became_switch(place);

@@ -311,7 +311,7 @@ bool simplify(const Fitter& fitter, FitState& state, std::size_t place) {
       const double at = found.shape == Shape::kExponential
                             ? found.points[0] * std::pow(1.07, i)
                             : found.points[0] + (found.high - found.low) * i / (6.0 * kSteps);
-      if (at > 0) finer.push_back(form(found, found.shape, 1, {at}));
+      if (at > 0 || found.shape == Shape::kAtLeast) finer.push_back(form(found, found.shape, 1, {at}));
     }
     put_best(fitter, simple, place, finer, true);
   }

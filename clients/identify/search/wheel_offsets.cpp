@@ -47,10 +47,12 @@ bool replace_by_wheel_offsets(const Fitter& fitter, FitState& state, std::size_t
   double best = fitter.log_evidence(state) + kOffsetsEvidence;
   std::optional<FitState> replaced;
   for (const WheelCommands& during : kWheelForms) {
-    // A gain and a turn rate of the same robots at the same instant are changes of the same two wheels.
-    const Basis& basis = had.front().basis;
-    const std::vector<Block> blocks = {{Target::kOffsetLeft, basis, during.of_left},
-                                       {Target::kOffsetRight, basis, during.of_right}};
+    // One block for all robots, or one for each with an instant of its own.
+    std::vector<Block> blocks;
+    for (const Block& block : had) {
+      blocks.push_back({Target::kOffsetLeft, block.basis, during.of_left});
+      blocks.push_back({Target::kOffsetRight, block.basis, during.of_right});
+    }
     FitState trial = state;
     trial.model.terms[place].name = "bias-by-robot-and-time";
     refine_to(fitter, trial, place, blocks);
