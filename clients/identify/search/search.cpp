@@ -453,7 +453,7 @@ class Loop {
   void note_renamed(const std::string& from, const std::string& to) {
     if (from == to) return;
     for (auto& step : out_.steps)
-      if (step.name == from) step.name = to;
+      if (step.added == from) step.added = to;
     for (Ambiguity& one : out_.ambiguous)
       if (one.found == from) one.found = to;
   }
