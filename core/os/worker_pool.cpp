@@ -18,6 +18,13 @@ constexpr int kSpins = 2000;
 /// Used if threads outnumber cores. One yield may last as long as another thread's time slice, so a few suffice.
 constexpr int kYields = 8;
 
+/// Sets a value and wakes the threads that wait for it. notify_all() finds waiting threads by a load, which must not overtake the
+/// store: a thread that begins to wait between both would sleep for ever. So the store is sequentially consistent.
+void announce(std::atomic<std::uint32_t>& value, std::uint32_t to) {
+  value.store(to, std::memory_order_seq_cst);
+  value.notify_all();
+}
+
 }  // namespace
 
 std::uint32_t cores() {
@@ -35,8 +42,7 @@ WorkerPool::WorkerPool(std::uint32_t threads) : spins_(threads <= cores() ? kSpi
 }
 
 WorkerPool::~WorkerPool() {
-  unclaimed_.store(kEnd, std::memory_order_release);
-  unclaimed_.notify_all();
+  announce(unclaimed_, kEnd);
   for (std::thread& thread : threads_) thread.join();
 }
 
@@ -49,8 +55,7 @@ void WorkerPool::for_each(std::size_t count, const Task& task) {
   task_ = &task;
   count_ = count;
   unfinished_.store(static_cast<std::uint32_t>(count), std::memory_order_relaxed);
-  unclaimed_.store(static_cast<std::uint32_t>(count), std::memory_order_release);
-  unclaimed_.notify_all();
+  announce(unclaimed_, static_cast<std::uint32_t>(count));
   work();
   for (std::uint32_t n = unfinished_.load(std::memory_order_acquire); n != 0;
        n = unfinished_.load(std::memory_order_acquire)) {

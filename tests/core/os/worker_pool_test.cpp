@@ -96,6 +96,15 @@ TEST(WorkerPool, DestructorEndsThreadsThatSearchForTasks) {
   }
 }
 
+// A thread that begins to wait while the destructor tells it to end must not sleep for ever. The delays cover that instant.
+TEST(WorkerPool, DestructorEndsThreadsThatBeginToWait) {
+  for (int i = 0; i < 6000; ++i) {
+    WorkerPool pool(2);
+    pool.for_each(2, [](std::size_t) {});
+    for (int pause = 0; pause < i % 3000; ++pause) __builtin_ia32_pause();
+  }
+}
+
 TEST(WorkerPool, ThrowsTheExceptionOfTheLowestTaskAndStaysUsable) {
   for (const std::uint32_t threads : {1u, 2u, 5u}) {
     WorkerPool pool(threads);
