@@ -29,9 +29,16 @@ std::optional<Situation> situation_at(const Axis& axis, double value) {
     case Covariate::kX: s.x_mm = value; return s;
     case Covariate::kY: s.y_mm = value; return s;
     case Covariate::kPointDistance:
-      if (value < 0) return std::nullopt;
-      s.x_mm = axis.point.x_mm + value;
-      s.y_mm = axis.point.y_mm;
+      // A place as far from the centre at the start, or at the centre when the circle has grown that much.
+      if (value >= 0) {
+        s.x_mm = axis.point.x_mm + value;
+        s.y_mm = axis.point.y_mm;
+        return s;
+      }
+      if (!(axis.point.growth_mm_s > 0)) return std::nullopt;
+      s.time_s = -value / axis.point.growth_mm_s;
+      s.x_mm = axis.point.x_mm + axis.point.velocity_x_mm_s * s.time_s;
+      s.y_mm = axis.point.y_mm + axis.point.velocity_y_mm_s * s.time_s;
       return s;
     case Covariate::kHeading: s.heading_rad = value; return s;
     case Covariate::kSinceCommand: s.commands.since_s = value; return s;
@@ -60,8 +67,11 @@ std::pair<double, double> range_of(const Factor& factor) {
     case Shape::kHarmonics: return {-M_PI, M_PI};
     case Shape::kExponential:
     case Shape::kLevelling: return {0, kDecayed * largest()};
-    case Shape::kAtLeast:
     case Shape::kWave: return {0, kBeyond * largest()};
+    case Shape::kAtLeast:
+      // Steps over places and distances lie within the range of the curve that they replaced.
+      if (factor.low < factor.points.front() && largest() < factor.high) return {factor.low, factor.high};
+      return {0, kBeyond * largest()};
     default: return {factor.low, factor.high};
   }
 }

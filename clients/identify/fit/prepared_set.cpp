@@ -52,6 +52,11 @@ void PreparedSet::set_command_lag(double lag_s) {
   for (const TrackView& view : views_) clocks->emplace_back(*view.track, lag_s);
   for (std::size_t v = 0; v < views_.size(); ++v) views_[v].clock = &(*clocks)[v];
   clocks_ = std::move(clocks);
+  for (std::size_t r = 0; r < neighbours_.size(); ++r) {
+    RunNeighbours neighbours = *neighbours_[r];
+    neighbours.set_command_lag(set_->runs[r], lag_s);
+    set_neighbours(r, std::move(neighbours));
+  }
 }
 
 void PreparedSet::set_neighbours(std::size_t run, RunNeighbours neighbours) {
@@ -108,7 +113,7 @@ void PreparedSet::find_centres(const MotionModel& model, std::uint32_t threads) 
     }
     for (std::size_t v = 0; v < views_.size(); ++v)
       if (views_[v].run == r) of_run[views_[v].place] = std::move(centres[v]);
-    RunNeighbours neighbours(set_->runs[r], &of_run);
+    RunNeighbours neighbours(set_->runs[r], &of_run, command_lag_s_);
     neighbours.update_traffic(set_->runs[r], model.cells);
     set_neighbours(r, std::move(neighbours));
   }

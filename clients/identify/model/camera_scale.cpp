@@ -242,6 +242,46 @@ Eigen::VectorXd log_scale_by_coefficients(const MotionModel& model) {
   return by;
 }
 
+namespace {
+
+/// Widens what a factor knows of places and distances. The phases of waves are left to the next fit.
+void widen(Factor& f, double factor, double middle_x_mm, double middle_y_mm) {
+  const auto widen_range = [&](const Axis& axis, double& low, double& high, std::vector<double>* points) {
+    double middle = 0;
+    switch (axis.of) {
+      case Covariate::kX: middle = middle_x_mm; break;
+      case Covariate::kY: middle = middle_y_mm; break;
+      case Covariate::kRadius:
+      case Covariate::kPointDistance: break;
+      default: return;
+    }
+    const auto wider = [&](double& at) { at = middle + factor * (at - middle); };
+    wider(low);
+    wider(high);
+    if (points == nullptr) return;
+    if (f.shape == Factor::Shape::kAtLeast)
+      for (double& at : *points) wider(at);
+    else if (f.shape == Factor::Shape::kWave || f.shape == Factor::Shape::kExponential ||
+             f.shape == Factor::Shape::kLevelling)
+      for (double& length_mm : *points) length_mm *= factor;
+  };
+  widen_range(f.axis, f.low, f.high, f.of_two() ? nullptr : &f.points);
+  if (f.of_two()) widen_range(f.and_axis, f.and_low, f.and_high, nullptr);
+  if (f.shape == Factor::Shape::kTravelling) {
+    f.points[0] /= factor;
+    f.points[1] /= factor;
+  }
+  if (f.axis.of == Covariate::kPointDistance) {
+    MovingPoint& point = f.axis.point;
+    point.x_mm = middle_x_mm + factor * (point.x_mm - middle_x_mm);
+    point.y_mm = middle_y_mm + factor * (point.y_mm - middle_y_mm);
+    for (double* const speed_mm_s : {&point.velocity_x_mm_s, &point.velocity_y_mm_s, &point.growth_mm_s})
+      *speed_mm_s *= factor;
+  }
+}
+
+}  // namespace
+
 bool rescale(MotionModel& model, double factor) {
   MotionModel scaled = model;
   LinearMap map;
@@ -256,16 +296,7 @@ bool rescale(MotionModel& model, double factor) {
     Eigen::Index first = 0;
     for (Block& block : term.blocks) {
       const auto n = static_cast<Eigen::Index>(block.basis.size());
-      for (Factor& f : block.basis.factors) {
-        const auto scale_axis = [&](Covariate of, double& low, double& high) {
-          if (of != Covariate::kX && of != Covariate::kY) return;
-          const double middle = of == Covariate::kX ? middle_x : middle_y;
-          wider(low, middle);
-          wider(high, middle);
-        };
-        scale_axis(f.axis.of, f.low, f.high);
-        if (f.of_two()) scale_axis(f.and_axis.of, f.and_low, f.and_high);
-      }
+      for (Factor& f : block.basis.factors) widen(f, factor, middle_x, middle_y);
       switch (block.target) {
         case Target::kOffset:
         case Target::kOffsetLeft:

@@ -20,8 +20,8 @@ double motor_on_s(const CommandState& commands, std::size_t motor, std::uint8_t 
 bool is_listed(const Axis& axis) { return axis.focus > 0 || axis.within_mm > 0 || is_of_some(axis); }
 
 bool counts(const Axis& axis, const OtherRobot& other) {
-  if (axis.others != Others::kAny && other.driven != (axis.others == Others::kDriven)) return false;
-  return axis.only_robot == 0 || other.robot + 1 == axis.only_robot;
+  if (axis.others != Others::kAny && (other.driven == 1) != (axis.others == Others::kDriven)) return false;
+  return axis.only_robot == 0 || other.robot + 1U == axis.only_robot;
 }
 
 /// The nearest neighbour that counts; null: none within the radius.

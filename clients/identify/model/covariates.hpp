@@ -24,9 +24,10 @@ inline constexpr std::size_t kFirstTrailGrid = 10;
 struct OtherRobot {
   float distance_mm = 0;               ///< centre to centre
   float towards_x = 0, towards_y = 0;  ///< unit vector; 0 if both are at the same place
-  std::uint32_t robot = 0;             ///< robot number
-  bool driven = true;                  ///< whether a motor is commanded to turn
+  std::uint32_t robot : 31 = 0;        ///< robot number
+  std::uint32_t driven : 1 = 1;        ///< whether a motor is commanded to turn
 };
+static_assert(sizeof(OtherRobot) == 16);
 /// Radius of the list of neighbours, mm.
 inline constexpr double kListed_mm = 160;
 

@@ -26,7 +26,7 @@ NeighbourView view_of(std::size_t robot, std::span<const double> x_mm, std::span
       const double d = std::sqrt(d2), by = d > 0 ? 1 / d : 0;
       const Neighbour is = who.empty() ? Neighbour{} : who[other];
       list->push_back(
-          {static_cast<float>(d), static_cast<float>(dx * by), static_cast<float>(dy * by), is.robot, is.driven});
+          {static_cast<float>(d), static_cast<float>(dx * by), static_cast<float>(dy * by), is.robot & 0x7fffffffU, is.driven});
     }
     for (std::size_t r = kNeighbourRadii_mm.size(); r-- > 0;) {
       const auto part = static_cast<float>(1 - d2 / (kNeighbourRadii_mm[r] * kNeighbourRadii_mm[r]));
@@ -43,7 +43,7 @@ NeighbourView view_of(std::size_t robot, std::span<const double> x_mm, std::span
   return view;
 }
 
-RunNeighbours::RunNeighbours(const Run& run, const std::vector<Centres>* centres) {
+RunNeighbours::RunNeighbours(const Run& run, const std::vector<Centres>* centres, double command_lag_s) {
   double end_s = -1e300;
   start_s_ = 1e300;
   for (const Track& track : run.tracks) {
@@ -56,18 +56,14 @@ RunNeighbours::RunNeighbours(const Run& run, const std::vector<Centres>* centres
   instants_ = static_cast<std::size_t>((end_s - start_s_) / kRaster_s) + 2;
   views_.resize(robots * instants_);
   spots_.assign(robots * instants_, {std::nan(""), std::nan(""), false});
-  std::vector<CommandClock> clocks(run.tracks.begin(), run.tracks.end());
   std::vector<std::size_t> next(robots, 0);
-  std::vector<double> x(robots), y(robots);
-  std::vector<Neighbour> who(robots);
   for (std::size_t i = 0; i < instants_; ++i) {
     const double t = start_s_ + static_cast<double>(i) * kRaster_s;
     for (std::size_t r = 0; r < robots; ++r) {
       const std::vector<Sample>& samples = run.tracks[r].samples;
       while (next[r] < samples.size() && samples[next[r]].time_s <= t) ++next[r];
-      x[r] = y[r] = std::nan("");
-      who[r] = {run.tracks[r].robot, clocks[r].at(t + 1e-9).driven()};
       if (next[r] == 0) continue;
+      Spot& spot = spots_[r * instants_ + i];
       const std::size_t last = next[r] - 1;
       const Sample& a = samples[last];
       const auto place = [&](std::size_t at) -> std::pair<double, double> {
@@ -76,22 +72,55 @@ RunNeighbours::RunNeighbours(const Run& run, const std::vector<Centres>* centres
       };
       const auto [ax, ay] = place(last);
       if (next[r] == samples.size()) {
-        if (t - a.time_s < kGap_s) x[r] = ax, y[r] = ay;
+        if (t - a.time_s < kGap_s) spot.x_mm = ax, spot.y_mm = ay;
         continue;
       }
       const Sample& b = samples[next[r]];
       if (b.time_s - a.time_s > kGap_s) continue;
       const double part = (t - a.time_s) / (b.time_s - a.time_s);
       const auto [bx, by] = place(next[r]);
-      x[r] = ax + part * (bx - ax);
-      y[r] = ay + part * (by - ay);
+      spot.x_mm = ax + part * (bx - ax);
+      spot.y_mm = ay + part * (by - ay);
+    }
+  }
+  set_driven(run, command_lag_s);
+  find_views(run);
+}
+
+void RunNeighbours::set_driven(const Run& run, double command_lag_s) {
+  for (std::size_t r = 0; r < run.tracks.size(); ++r) {
+    const CommandClock clock(run.tracks[r], command_lag_s);
+    for (std::size_t i = 0; i < instants(); ++i)
+      spots_[r * instants_ + i].driven = clock.at(time_s(i) + 1e-9).driven();
+  }
+}
+
+void RunNeighbours::find_views(const Run& run) {
+  const std::size_t robots = run.tracks.size();
+  const auto others = std::make_shared<std::vector<OtherRobot>>();
+  std::vector<double> x(robots), y(robots);
+  std::vector<Neighbour> who(robots);
+  for (std::size_t i = 0; i < instants(); ++i) {
+    for (std::size_t r = 0; r < robots; ++r) {
+      const Spot& s = spot(r, i);
+      x[r] = s.x_mm;
+      y[r] = s.y_mm;
+      who[r] = {run.tracks[r].robot, s.driven};
     }
     for (std::size_t r = 0; r < robots; ++r) {
       if (std::isnan(x[r])) continue;
-      views_[r * instants_ + i] = view_of(r, x, y, others_.get(), who);
-      spots_[r * instants_ + i] = {x[r], y[r], who[r].driven};
+      NeighbourView& view = views_[r * instants_ + i];
+      const auto traffic = view.traffic;
+      view = view_of(r, x, y, others.get(), who);
+      view.traffic = traffic;
     }
   }
+  others_ = others;
+}
+
+void RunNeighbours::set_command_lag(const Run& run, double command_lag_s) {
+  set_driven(run, command_lag_s);
+  find_views(run);
 }
 
 void RunNeighbours::update_traffic(const Run& run, const std::array<GridCells, kTrafficGrids>& cells) {

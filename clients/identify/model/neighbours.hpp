@@ -33,8 +33,10 @@ class RunNeighbours {
   /// A robot is absent in gaps longer than this, s.
   static constexpr double kGap_s = 4;
 
-  /// From measured positions, or from estimated disc centres by track.
-  explicit RunNeighbours(const Run&, const std::vector<Centres>* centres = nullptr);
+  /// From measured positions, or from estimated disc centres by track. `command_lag_s`: as of CommandClock.
+  explicit RunNeighbours(const Run&, const std::vector<Centres>* centres = nullptr, double command_lag_s = 0);
+  /// With another lag: other robots are driven at other instants. The traffic stays as it is until update_traffic().
+  void set_command_lag(const Run&, double command_lag_s);
   [[nodiscard]] const NeighbourView& view(std::size_t track, double time_s) const;
   /// Computes the traffic for these grids.
   void update_traffic(const Run&, const std::array<GridCells, kTrafficGrids>& cells);
@@ -53,12 +55,15 @@ class RunNeighbours {
   }
 
  private:
+  void set_driven(const Run&, double command_lag_s);
+  void find_views(const Run&);
+
   double start_s_ = 0;
   std::size_t instants_ = 0;
   std::vector<NeighbourView> views_;  ///< [track][instant]
   std::vector<Spot> spots_;           ///< [track][instant]
   /// Neighbours of all views. On the heap and shared, so that views stay valid in a copy.
-  std::shared_ptr<std::vector<OtherRobot>> others_ = std::make_shared<std::vector<OtherRobot>>();
+  std::shared_ptr<const std::vector<OtherRobot>> others_;
   NeighbourView nobody_;
 };
 

@@ -91,6 +91,7 @@ class Loop {
   bool changed() {
     say(kTest, "testing hypotheses");
     if (limit().empty() && accept_calibration_shifts()) return true;
+    if (has_parts_of_circle() && accept_moving_circle(true)) return true;
     score_dictionary();
     const ScoreTest::Outcome outcome = score_test_->test(kSeed + static_cast<std::uint64_t>(round_));
     note_rejected(outcome);
@@ -105,7 +106,7 @@ class Loop {
       ++failures_;
     }
     say(kAlternatives, "testing alternatives");
-    return eliminate() || accept_moving_circle() || accept_general();
+    return eliminate() || accept_moving_circle(false) || accept_further_circle() || accept_general();
   }
   /// The limit that the search has reached, in one sentence; empty: none. It then adds nothing more.
   [[nodiscard]] std::string limit() const {
@@ -311,15 +312,34 @@ class Loop {
            std::all_of(reason.covariates.begin(), reason.covariates.end(),
                        [](const std::string& of) { return of == "position" || of == "time"; });
   }
+  /// Whether effects of both position and time were found that a moving circle may replace. Its further proxies would cost many
+  /// rounds.
+  [[nodiscard]] bool has_parts_of_circle() const {
+    std::set<std::string> of;
+    for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t)
+      if (may_be_part_of_circle(t)) of.insert(out_.reasons[t].covariates.begin(), out_.reasons[t].covariates.end());
+    return of.size() == 2;
+  }
+  /// Whether a hypothesis beside the model passes the tests and explains a fair share of what its terms explain.
+  bool leaves_hypothesis() {
+    constexpr double kFair = 0.02;
+    score_dictionary();
+    const ScoreTest::Outcome outcome = score_test_->test(kSeed + static_cast<std::uint64_t>(round_));
+    return best_of(outcome, kFair * explained()) != nullptr;
+  }
   /// Effects of position and of time can be proxies of a circle that moves or grows: tries one in place of all of them. It stays
-  /// if the evidence of the whole model is larger.
-  bool accept_moving_circle() {
+  /// if the evidence of the whole model is larger. `alone`: and if no hypothesis finds much beside it. Otherwise the effects may grow
+  /// into a product that explains more.
+  bool accept_moving_circle(bool alone) {
     // One amplitude within a circle explains less than its curve: the share of what the other terms explain that is worth a fit.
-    constexpr double kLeastShare = 0.5;
-    std::string key = "circle for";
+    // What it leaves may belong to a product that comes later, unless nothing is left beside it.
+    const double least_share = alone ? 0.2 : 0.5;
+    const std::string start = alone ? "lone circle for" : "circle for";
+    std::string key = start;
     for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t)
       if (may_be_part_of_circle(t)) key += " " + out_.fit.model.terms[t].name;
-    if (key == "circle for" || !limit().empty() || !failed_.insert(key).second) return false;
+    if (key == start || worked_out() || !failed_.insert(key).second) return false;
+    say(kAlternatives, "testing moving circles");
     const Search before = out_;
     const double evidence = fitter_.log_evidence(out_.fit), likelihood = fitter_.log_likelihood_of_all(out_.fit);
     for (std::size_t t = out_.fit.model.terms.size(); t-- > 0;) {
@@ -330,15 +350,28 @@ class Loop {
     fitter_.fit(out_.fit, 2);
     const double explained = likelihood - fitter_.log_likelihood_of_all(out_.fit);
     const std::vector<MovingCircle> circles = moving_circles_of(fitter_, out_.fit, extent_);
-    if (!circles.empty() && circles.front().gain > kLeastShare * explained) {
+    if (!circles.empty() && circles.front().gain > least_share * explained) {
       std::map<std::string, GeneralTerm> best;
-      add_candidates(dictionary_of_circles(out_.fit, extent_, circles), false, kLeastShare * explained, best);
+      add_candidates(dictionary_of_circles(out_.fit, extent_, circles), false, least_share * explained, best);
       if (!best.empty() && fits(std::move(best.begin()->second), key) &&
-          fitter_.log_evidence(out_.fit) > evidence + kClose)
+          fitter_.log_evidence(out_.fit) > evidence + kClose && !(alone && leaves_hypothesis()))
         return true;
     }
     out_ = before;
     return false;
+  }
+  /// Adds a moving circle beside the other terms, if it passes the tests. Returns whether there is one.
+  bool accept_further_circle() {
+    // Chance finds circles with a smaller gain in most sets.
+    constexpr double kLeastGain = 30;
+    const std::string key = std::string(kForm) + "speed-by-position-and-time";
+    if (!limit().empty() || failed_.contains(key)) return false;
+    say(kAlternatives, "testing moving circles");
+    const std::vector<MovingCircle> circles = moving_circles_of(fitter_, out_.fit, extent_);
+    if (circles.empty() || circles.front().gain < kLeastGain) return false;
+    std::map<std::string, GeneralTerm> best;
+    add_candidates(dictionary_of_circles(out_.fit, extent_, circles), false, kRemnant * explained(), best);
+    return !best.empty() && fits(std::move(best.begin()->second), key);
   }
   /// Adds the general term with the most evidence that fits, if much is left unexplained. Returns whether there is one.
   bool accept_general() {
