@@ -11,7 +11,8 @@
 namespace kilotwin::identify {
 namespace {
 
-/// A term that lowers the error by this share stays, whatever the sign of an uncertain gain in likelihood.
+/// A term that lowers the error by this share stays, whatever the sign of an uncertain gain in likelihood. A term of the measurement
+/// that raises the error by this share goes, whatever its gain.
 constexpr double kClearError = 0.02;
 
 bool on_measurement(const Term& term) { return is_measured(term.blocks.front().target); }
@@ -80,8 +81,10 @@ Trial trial_of(const Fitter& fitter, const FitState& fit, std::size_t t, const E
   Judged judged = choosing.judge(without, times);
   const double without_mm = error_mm(judged, with.errors.rows);
   const HeldOutGain gain = held_out_gain(fit.model, without.model, with.tracks, choosing.of(), fitter.threads());
-  // Effects of the measurement hardly change predicted positions. They must not raise the error.
-  const double least_mm = with_mm * (on_measurement(fit.model.terms[t]) ? 1 - kSameError : 1 + kSameError);
+  // Effects of the measurement hardly change predicted positions. They must not raise the error; if their gain is beyond chance, not
+  // clearly.
+  const double may_rise = gain.nat > 2 * gain.nat_se ? kClearError : kSameError;
+  const double least_mm = with_mm * (on_measurement(fit.model.terms[t]) ? 1 - may_rise : 1 + kSameError);
   // A likelihood of few tracks has a large error of its own. Negated, so that a gain that is no number does not pass.
   const bool is_unlikely =
       !(gain.nat + 2 * gain.nat_se >= 0) || (gain.nat < 0 && !(without_mm > with_mm * (1 + kClearError)));
