@@ -233,7 +233,7 @@ Amplitudes without_amplitudes(const std::vector<Effect>& effects) {
   return out;
 }
 
-/// "circle about (-50, 60) mm, moving at (1.2, 0.3) mm/s, radius growing by 1.6 mm/s".
+/// "circles about (-50, 60) mm at the start, moving at (1.20, 0.30) mm/s, growing by 1.60 mm/s".
 std::string point_in_words(const proto::MovingPoint& p) {
   std::string words = fmt::format("circles about ({:.0f}, {:.0f}) mm", p.x_mm(), p.y_mm());
   if (p.velocity_x_mm_s() != 0 || p.velocity_y_mm_s() != 0)

@@ -332,7 +332,7 @@ class Loop {
   /// into a product that explains more.
   bool accept_moving_circle(bool alone) {
     // One amplitude within a circle explains less than its curve: the share of what the other terms explain that is worth a fit.
-    // What it leaves may belong to a product that comes later, unless nothing is left beside it.
+    // A product that comes later may explain what the circle leaves, unless it leaves nothing.
     const double least_share = alone ? 0.2 : 0.5;
     const std::string start = alone ? "lone circle for" : "circle for";
     std::string key = start;
