@@ -25,8 +25,8 @@ NeighbourView view_of(std::size_t robot, std::span<const double> x_mm, std::span
     if (list != nullptr && d2 <= kListed_mm * kListed_mm) {
       const double d = std::sqrt(d2), by = d > 0 ? 1 / d : 0;
       const Neighbour is = who.empty() ? Neighbour{} : who[other];
-      list->push_back(
-          {static_cast<float>(d), static_cast<float>(dx * by), static_cast<float>(dy * by), is.robot & 0x7fffffffU, is.driven});
+      list->push_back({static_cast<float>(d), static_cast<float>(dx * by), static_cast<float>(dy * by),
+                       is.robot & 0x7fffffffU, is.driven});
     }
     for (std::size_t r = kNeighbourRadii_mm.size(); r-- > 0;) {
       const auto part = static_cast<float>(1 - d2 / (kNeighbourRadii_mm[r] * kNeighbourRadii_mm[r]));
