@@ -39,7 +39,7 @@ struct Factor {
   std::vector<double> points;
   /// Not empty: fixed coefficients. The columns collapse into one, a known curve.
   std::vector<double> known = {};
-  /// Constant added to a known curve. Used by amplitudes only: tables, cosines, maps, harmonics.
+  /// Constant added to a known curve: tables, steps, cosines, maps, harmonics.
   double plus = 0;
 
   [[nodiscard]] bool of_two() const {

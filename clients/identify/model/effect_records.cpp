@@ -156,8 +156,8 @@ void set_table(Function& function, const Factor& factor, const Eigen::VectorXd& 
 
 void set_steps(Function& function, const Factor& factor, const Eigen::VectorXd& coefficients) {
   proto::Steps& steps = *function.mutable_steps();
-  double value = 0;
-  steps.add_value(0);
+  double value = factor.plus;
+  steps.add_value(rounded(value));
   for (std::size_t i = 0; i < factor.points.size(); ++i) {
     if (coefficients[static_cast<Eigen::Index>(i)] == 0) continue;
     value += coefficients[static_cast<Eigen::Index>(i)];

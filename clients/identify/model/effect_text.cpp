@@ -210,26 +210,36 @@ std::string amplitudes_in_words(const Function& f) {
     };
     return fmt::format("times {:.2f} ({}) to {:.2f} ({})", *low, key(low), *high, key(high));
   }
+  if (f.has_steps() && f.steps().at_size() > 0) {
+    const proto::Steps& steps = f.steps();
+    std::string words = fmt::format("times {:.2f} at first", steps.value(0));
+    constexpr int kMost = 3;
+    for (int i = 0; i < std::min(steps.at_size(), kMost); ++i)
+      words += fmt::format(", {:.2f} from {} on", steps.value(i + 1), place(steps.at(i), f));
+    return words;
+  }
   if (!f.has_spline() || f.spline().knot_size() == 0) return "with varying amplitude";
   const int last = f.spline().knot_size() - 1;
   return fmt::format("times {:.2f} at {} to {:.2f} at {}", f.spline().value(0), place(f.spline().knot(0), f.of()),
                      f.spline().value(last), place(f.spline().knot(last), f.of()));
 }
 
-/// A curve times amplitudes, as shown: the curve at amplitude 1.
+/// A curve times amplitudes, as shown: the curve at amplitude 1. Products of three functions have two amplitudes.
 struct Amplitudes {
   std::vector<Effect> curves;
-  std::optional<Function> amplitudes;
+  std::vector<Function> amplitudes;
 };
 Amplitudes without_amplitudes(const std::vector<Effect>& effects) {
   Amplitudes out{effects, {}};
+  if (effects.empty()) return out;
   const auto alike = [&](const Effect& effect) {
     return effect.function_size() > 1 &&
-           effect.function(0).SerializeAsString() == effects.front().function(0).SerializeAsString();
+           effect.function(0).SerializeAsString() == out.curves.front().function(0).SerializeAsString();
   };
-  if (effects.empty() || !std::all_of(effects.begin(), effects.end(), alike)) return out;
-  out.amplitudes = effects.front().function(0);
-  for (Effect& effect : out.curves) effect.mutable_function()->DeleteSubrange(0, 1);
+  while (std::all_of(out.curves.begin(), out.curves.end(), alike)) {
+    out.amplitudes.push_back(out.curves.front().function(0));
+    for (Effect& effect : out.curves) effect.mutable_function()->DeleteSubrange(0, 1);
+  }
   return out;
 }
 
@@ -403,7 +413,8 @@ std::string size_in_words(const std::vector<Effect>& effects) {
     if (size.empty()) return "";
     parts.push_back(which_of(effect) + size);
   }
-  if (shown.amplitudes && !parts.empty()) parts.push_back(amplitudes_in_words(*shown.amplitudes));
+  if (!parts.empty())
+    for (const Function& amplitudes : shown.amplitudes) parts.push_back(amplitudes_in_words(amplitudes));
   return fmt::format("{}", fmt::join(parts, "; "));
 }
 

@@ -6,15 +6,6 @@
 
 namespace kilotwin::identify {
 
-Factor known_curve(const Term& term, std::size_t factor) {
-  const Basis& basis = term.blocks.front().basis;
-  Factor curve = basis.factors[factor];
-  curve.known.assign(curve.columns(), 0);
-  for (std::size_t i = 0; i < basis.size(); ++i)
-    curve.known[basis.chosen.empty() ? i : basis.chosen[i]] = term.coefficients[static_cast<Eigen::Index>(i)];
-  return curve;
-}
-
 bool is_camera_map(const Term& term) {
   return std::any_of(term.blocks.begin(), term.blocks.end(), [](const Block& block) {
     const auto of_place = [](Covariate c) { return c == Covariate::kX || c == Covariate::kY; };

@@ -90,9 +90,6 @@ struct Term {
   bool general = false;
 };
 
-/// The curve of the first block with its present coefficients, as a factor with known coefficients. `factor`:
-/// index of the open factor; any others are known.
-[[nodiscard]] Factor known_curve(const Term&, std::size_t factor);
 /// Whether the term is a map of camera distortion.
 [[nodiscard]] bool is_camera_map(const Term&);
 

@@ -22,13 +22,14 @@ class Edges {
   explicit Edges(const MotionModel& model) {
     for (const Term& term : model.terms)
       for (const Block& block : term.blocks)
-        if (block.basis.factors.size() == 1 && block.basis.factors.front().shape == Factor::Shape::kGrid)
-          maps_.push_back(&block.basis);
+        // The last factor of a product is its map.
+        if (!block.basis.factors.empty() && block.basis.factors.back().shape == Factor::Shape::kGrid)
+          maps_.push_back(&block.basis.factors.back());
   }
   [[nodiscard]] bool any() const { return !maps_.empty(); }
   [[nodiscard]] bool near(double x_mm, double y_mm, double reach_mm) const {
     constexpr double kMuch = 0.1;  // relative to the robot's speed
-    for (const Basis* const map : maps_) {
+    for (const Factor* const map : maps_) {
       double least = 1e300, most = -1e300;
       for (const auto& [x, y] : {std::pair{0, 0}, {1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
         Situation s;
@@ -45,7 +46,7 @@ class Edges {
   }
 
  private:
-  std::vector<const Basis*> maps_;
+  std::vector<const Factor*> maps_;
 };
 
 /// Forecasts of the robots of one run, from an instant on by their commands alone.

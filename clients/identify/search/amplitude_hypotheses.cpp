@@ -1,10 +1,11 @@
 #include "clients/identify/search/covariate_hypotheses.hpp"
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <utility>
 
-#include "clients/identify/search/amplitudes.hpp"
+#include "clients/identify/search/products.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -48,12 +49,14 @@ struct Multiplied {
 
 /// The function of a term that amplitudes can multiply; nothing: it has no such form.
 std::optional<Multiplied> multiplied_by(const Term& term) {
-  const std::vector<Factor>& factors = term.blocks.front().basis.factors;
   Multiplied out;
-  if (factors.empty()) return out;
-  if (factors.size() > 1 || factors.front().shape == Shape::kTable || !factors.front().known.empty())
+  if (term.blocks.front().basis.factors.empty()) return out;
+  out.basis.factors = functions_of(term);
+  const std::vector<Factor>& factors = out.basis.factors;
+  constexpr std::size_t kMostFunctions = 2;  // with the amplitudes three
+  if (factors.empty() || factors.size() > kMostFunctions ||
+      (factors.size() == 1 && factors.front().shape == Shape::kTable))
     return std::nullopt;
-  out.basis.factors = {known_curve(term, 0)};
   for (const Factor& factor : out.basis.factors) {
     const auto [name, word] = covariate_words(factor.axis.of);
     if (out.is_of(word)) return std::nullopt;
@@ -64,6 +67,30 @@ std::optional<Multiplied> multiplied_by(const Term& term) {
     out.words.emplace_back("time");
   }
   return out;
+}
+
+/// Names of effects of three covariates list them in this order, whichever was found first.
+constexpr std::array<std::pair<const char*, const char*>, 9> kOrder{{{"robot", "robot"},
+                                                                     {"history", "history"},
+                                                                     {"command", "command"},
+                                                                     {"neighbours", "neighbours"},
+                                                                     {"heading", "heading"},
+                                                                     {"motor-time", "motor_time"},
+                                                                     {"time-since-command", "time_since_command"},
+                                                                     {"time", "time"},
+                                                                     {"position", "position"}}};
+
+/// Puts an effect of three covariates into the common order. Pairs keep theirs.
+void put_in_order(std::string& name, std::vector<std::string>& words) {
+  if (words.size() < 3) return;
+  const auto place = [](const std::string& word) {
+    return std::find_if(kOrder.begin(), kOrder.end(), [&](const auto& one) { return one.second == word; });
+  };
+  std::stable_sort(words.begin(), words.end(),
+                   [&](const std::string& a, const std::string& b) { return place(a) < place(b); });
+  name.clear();
+  for (const std::string& word : words)
+    name += (name.empty() ? "" : "-and-") + std::string(place(word) == kOrder.end() ? word : place(word)->first);
 }
 
 /// The amplitude of a known function may depend on time, place or heading. The known factors come
@@ -84,6 +111,7 @@ void of_known_and_more(DictionaryBuilder& make, const Extent& extent, const Targ
       std::swap(words[0], words[1]);
       name = "time-and-position";
     }
+    put_in_order(name, words);
     for (const Eigen::Index size : sizes) make.add(group, name, words, some(bases, 0, size));
   };
   beside("time", over(Shape::kCosines, Covariate::kTime, 0, extent.duration_s, 6), {1, 2, 6});
@@ -110,7 +138,9 @@ void add_amplitude_hypotheses(DictionaryBuilder& make, const Extent& extent, con
       basis.factors.insert(basis.factors.begin(), keyed(Shape::kTable, covariate, keys));
       std::vector<std::string> words = known->words;
       words.push_back(word);
-      make.add(*group, known->name.empty() ? name : name + "-and-" + known->name, words,
+      std::string all = known->name.empty() ? name : name + "-and-" + known->name;
+      put_in_order(all, words);
+      make.add(*group, all, words,
                some(make.put(*group, basis, block.during), 0, static_cast<Eigen::Index>(keys.size())));
     };
     if (extent.has_straight && extent.has_turns) amplitudes(Covariate::kCommand, {1, 2, 3});

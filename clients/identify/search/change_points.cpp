@@ -16,13 +16,16 @@ using Shape = Factor::Shape;
 constexpr std::size_t kMostPoints = 150, kMostSteps = 12;
 constexpr double kLeastGain = 2;
 
-/// Step columns at chosen points of a block, repeated for each target.
+/// Step columns at chosen points in place of a block's curve, repeated for each target. Known factors stay.
 Block stepping(const Block& like, const std::vector<double>& points) {
+  Block block{like.target, Basis{like.basis.factors}, like.during};
+  Factor& curve = *block.basis.only_open();
   Factor f;
   f.shape = Shape::kAtLeast;
-  f.axis = like.basis.factors.front().axis;
+  f.axis = curve.axis;
   f.points = points;
-  return {like.target, Basis{{f}}, like.during};
+  curve = f;
+  return block;
 }
 std::vector<Block> stepping(const std::vector<Block>& kinds, const std::vector<double>& at) {
   std::vector<Block> blocks;
@@ -239,12 +242,15 @@ std::string find_change_points(const Fitter& fitter, FitState& state, std::size_
   const MotionModel& model = state.model;
   const std::string name = model.terms[place].name;
   double duration_s = 0;
+  bool product = false;
   std::vector<Block> kinds;
   for (const Block& block : model.terms[place].blocks) {
-    if (block.basis.factors.size() != 1) return name;
+    const Factor* const curve = block.basis.only_open();
+    if (curve == nullptr || (block.basis.factors.size() != 1 && curve != &block.basis.factors.back())) return name;
     // Rotations and scale changes of the image belong to calibration_shifts.hpp.
     if (block.target == Target::kMeasuredTurn || block.target == Target::kMeasuredScale) return name;
-    const Factor& f = block.basis.factors.front();
+    const Factor& f = *curve;
+    product = product || block.basis.factors.size() > 1;
     if (!goes_on(f.axis) || f.shape != Shape::kCosines) return name;
     duration_s = std::max(duration_s, f.high);
     if (std::none_of(kinds.begin(), kinds.end(),
@@ -255,7 +261,13 @@ std::string find_change_points(const Fitter& fitter, FitState& state, std::size_
   const double apart_s = std::max(1.0, duration_s / kMostPoints);
   for (double at = apart_s; at < duration_s - apart_s / 2 && points.size() < kMostPoints; at += apart_s)
     points.push_back(at);
-  std::vector<Steps> forms = {{kinds, false, {}, 0}, {kinds, true, {}, 0}};
+  std::vector<Steps> forms = {{kinds, false, {}, 0}};
+  if (product) {
+    // A curve of a product has a constant, as has a step before all data.
+    points.insert(points.begin(), -2 * apart_s);
+  } else {
+    forms.push_back({kinds, true, {}, 0});
+  }
   // A displacement in the world and one of the camera look alike until the instant is known.
   const Basis basis = kinds.front().basis;
   const std::vector<Block> walls = {{Target::kWorldX, basis, kDriven}, {Target::kWorldY, basis, kDriven}},
@@ -263,8 +275,9 @@ std::string find_change_points(const Fitter& fitter, FitState& state, std::size_
   const Target acts_on = kinds.front().target;
   const bool in_world = acts_on == Target::kWorldX || acts_on == Target::kWorldY,
              in_image = acts_on == Target::kMeasuredX;
-  const bool by_the_clock = basis.factors.front().axis.of == Covariate::kTime;
-  if (by_the_clock && (in_world || in_image)) forms.push_back({in_world ? picture : walls, false, {}, 0});
+  const bool by_the_clock = basis.only_open()->axis.of == Covariate::kTime;
+  if (!product && by_the_clock && (in_world || in_image))
+    forms.push_back({in_world ? picture : walls, false, {}, 0});
   // On the raster the gain is approximate. The decision follows after the refinement.
   FitState best = state;
   double best_gain = 0;

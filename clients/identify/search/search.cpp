@@ -16,6 +16,7 @@
 #include "clients/identify/search/dictionary_builder.hpp"
 #include "clients/identify/search/moving_circles.hpp"
 #include "clients/identify/search/neighbour_shape.hpp"
+#include "clients/identify/search/products.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
 #include "clients/identify/search/simplification.hpp"
 #include "clients/identify/search/target_extension.hpp"
@@ -499,7 +500,7 @@ class Loop {
   void refine_form(std::size_t place) {
     if (out_.fit.model.terms[place].general) {
       refit(fitter_, out_.fit, place);
-      became_switch(place);
+      if (!became_switch(place) && separate(fitter_, out_.fit, place)) extend_targets(fitter_, out_.fit, place);
       return;
     }
     if (!refine_neighbour_shape(fitter_, out_.fit, place) && !refine_traffic_shape(fitter_, out_.fit, place))
@@ -571,7 +572,7 @@ class Loop {
       for (const Hypothesis& h : dictionary_.hypotheses) {
         if (h.log_choices > kManyChoices && h.name != out_.fit.model.terms[place].name) continue;
         // Amplitudes of this term's curve are no alternative: they contain the curve.
-        if (!multiplies_known_curve(dictionary_.term_of(h, 1))) others.push_back(&h);
+        if (!multiplies_term(out_.fit.model, dictionary_.term_of(h, 1))) others.push_back(&h);
       }
       const std::vector<Finding> findings = score_test_->evidence_of_each(others, t);
       const Hypothesis* best = nullptr;
@@ -630,7 +631,7 @@ class Loop {
   /// A new effect may explain what earlier terms were accepted for, unless it has far less evidence. Tries to
   /// remove each earlier term, with the shape of the new one refined.
   void eliminate_earlier() {
-    if (multiplies_known_curve(out_.fit.model.terms.back())) return;
+    if (multiplies_term(out_.fit.model, out_.fit.model.terms.back())) return;
     constexpr double kFarLess = 0.1;
     for (std::size_t t = out_.fit.model.terms.size() - 1; t-- > 0;) {
       const Term &earlier = out_.fit.model.terms[t], &last = out_.fit.model.terms.back();

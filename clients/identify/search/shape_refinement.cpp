@@ -11,7 +11,6 @@ namespace {
 
 using Shape = Factor::Shape;
 
-constexpr int kMostPasses = 5;
 /// Convergence: gain in log likelihood of one more pass.
 constexpr double kSettled = 1;
 /// Pruning threshold of a column: its prior sd times the root of its information.
@@ -115,18 +114,17 @@ void shorten(Basis& basis) {
   }
 }
 
-/// Fixed amplitudes that multiply a curve or a map.
-const Factor* amplitudes_of(const Basis& basis) {
-  const bool any = basis.factors.size() == 2 && basis.only_open() == &basis.factors[1];
-  return any ? &basis.factors.front() : nullptr;
-}
-
-/// Whether a constant is identifiable: for drift and slip, since biases cannot absorb it, and for effects with
-/// amplitudes.
+/// Whether a constant is identifiable: for drift and slip, since biases cannot absorb it.
 bool has_constant_part(const Block& block) {
   const Target target = block.target;
-  return target == Target::kWorldX || target == Target::kWorldY || target == Target::kSideways ||
-         (!is_measured(target) && amplitudes_of(block.basis) != nullptr);
+  return target == Target::kWorldX || target == Target::kWorldY || target == Target::kSideways;
+}
+
+/// Whether known factors multiply a curve or a map. Such a term keeps its columns (products.hpp).
+bool is_product(const Term& term) {
+  const std::vector<Factor>& factors = term.blocks.front().basis.factors;
+  return factors.size() > 1 &&
+         std::any_of(factors.begin(), factors.end(), [](const Factor& f) { return !f.known.empty(); });
 }
 
 /// A single curve. Its column of frequency 0 is the constant.
@@ -135,7 +133,7 @@ bool is_curve(const Basis& basis) {
   return open != nullptr && open->shape == Shape::kCosines;
 }
 
-/// Constant, up to fixed amplitudes.
+/// Constant, up to known factors.
 bool is_constant(const Basis& basis) {
   return std::all_of(basis.factors.begin(), basis.factors.end(), [](const Factor& f) { return !f.known.empty(); });
 }
@@ -189,7 +187,6 @@ std::vector<Block> richer(const Term& term) {
     const Factor* const open = block.basis.only_open();
     if (!has_constant_part(block) || open == nullptr || !open->of_two()) continue;
     Block constant{block.target, {}, block.during};
-    if (const Factor* const amplitudes = amplitudes_of(block.basis)) constant.basis.factors = {*amplitudes};
     if (std::none_of(blocks.begin(), blocks.end(), [&](const Block& b) {
           return is_constant(b.basis) && b.target == constant.target && b.during == constant.during;
         }))
@@ -353,13 +350,14 @@ double choose_smoothness(const Eigen::MatrixXd& information, const Eigen::Vector
 namespace {
 
 /// Uses the `rich` blocks in place of the term's, or the term's own if there are none.
-void fit_smoothly(const Fitter& fitter, FitState& state, std::size_t place, const std::vector<Block>& rich) {
+void fit_smoothly(const Fitter& fitter, FitState& state, std::size_t place, const std::vector<Block>& rich,
+                  int passes = 5) {
   MotionModel& model = state.model;
   const std::vector<ColumnGroup> groups = groups_of(rich.empty() ? model.terms[place].blocks : rich);
   std::vector<Smoothness> smoothness;
   Eigen::VectorXd sd;
   double likelihood = -1e300;
-  for (int pass = 0; pass < kMostPasses; ++pass) {
+  for (int pass = 0; pass < passes; ++pass) {
     const bool anew = pass == 0 && !rich.empty();
     const LocalQuadratic l = local_quadratic(fitter, state, place, anew ? rich : std::vector<Block>{});
     Term& term = model.terms[place];
@@ -376,7 +374,7 @@ void fit_smoothly(const Fitter& fitter, FitState& state, std::size_t place, cons
     }
     fitter.fit(state, 1);
     const double now = fitter.log_likelihood(state);
-    const bool last = pass + 1 == kMostPasses || now < likelihood + kSettled;
+    const bool last = pass + 1 == passes || now < likelihood + kSettled;
     likelihood = now;
     if (!last) continue;
     prune(term, data.information.diagonal());
@@ -387,12 +385,13 @@ void fit_smoothly(const Fitter& fitter, FitState& state, std::size_t place, cons
 }  // namespace
 
 void refine_curves(const Fitter& fitter, FitState& state, std::size_t place) {
-  if (state.model.terms[place].general) return refit(fitter, state, place);
+  if (state.model.terms[place].general || is_product(state.model.terms[place])) return refit(fitter, state, place);
   fit_smoothly(fitter, state, place, richer(state.model.terms[place]));
 }
 
-void refine_to(const Fitter& fitter, FitState& state, std::size_t place, const std::vector<Block>& blocks) {
-  fit_smoothly(fitter, state, place, blocks);
+void refine_to(const Fitter& fitter, FitState& state, std::size_t place, const std::vector<Block>& blocks,
+               int passes) {
+  fit_smoothly(fitter, state, place, blocks, passes);
 }
 
 void refit(const Fitter& fitter, FitState& state, std::size_t place) { fit_smoothly(fitter, state, place, {}); }

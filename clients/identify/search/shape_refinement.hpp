@@ -33,8 +33,8 @@ double choose_smoothness(const Eigen::MatrixXd& information, const Eigen::Vector
 [[nodiscard]] Factor richer(Factor);
 /// Replaces the term's bases by rich ones and refits the model until it converges.
 void refine_curves(const Fitter&, FitState&, std::size_t term);
-/// The same with given blocks.
-void refine_to(const Fitter&, FitState&, std::size_t term, const std::vector<Block>&);
+/// The same with given blocks. `passes`: most alternations of the smoothness and the fit.
+void refine_to(const Fitter&, FitState&, std::size_t term, const std::vector<Block>&, int passes = 5);
 /// Refits the term with its present bases.
 void refit(const Fitter&, FitState&, std::size_t term);
 

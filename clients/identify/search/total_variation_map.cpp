@@ -29,7 +29,8 @@ double unit_of(Target target) {
 /// Normal equations of the nodes near a robot's path, from the innovations.
 class FineSums {
  public:
-  FineSums(const MotionModel& model, const Block& map, NormalEquations& to) : model_(model), map_(map), to_(to) {}
+  FineSums(const MotionModel& model, const Block& map, NormalEquations& to)
+      : model_(model), map_(map), fixed_{{map.basis.factors.begin(), map.basis.factors.end() - 1}}, to_(to) {}
 
   void start(const TrackFilter&) { active_.clear(); }
   void step(const StepRecord& record) {
@@ -39,13 +40,16 @@ class FineSums {
     in_contact_ = in_contact_ || record.in_contact();
     const int command = static_cast<int>(record.middle.commands.command);
     if (!record.middle.commands.driven() || (map_.during >> command & 1) == 0) return;
-    const Eigen::Vector3d force = record.h_s * ways.by_wheel * by_value(record, r);
     const NodeGrid& g = to_.grid;
     const double u = std::clamp((record.middle.x_mm - g.x_mm) / g.pitch_mm, 0.0, g.columns - 1.001),
                  v = std::clamp((record.middle.y_mm - g.y_mm) / g.pitch_mm, 0.0, g.rows - 1.001);
     i_ = static_cast<int>(u);
     j_ = static_cast<int>(v);
     const double x = u - i_, y = v - j_;
+    double size = 1;
+    fixed_.evaluate(record.middle, 0, &size);
+    if (size == 0) return;
+    const Eigen::Vector3d force = size * record.h_s * ways.by_wheel * by_value(record, r);
     add(i_, j_, (1 - x) * (1 - y) * force);
     add(i_ + 1, j_, x * (1 - y) * force);
     add(i_, j_ + 1, (1 - x) * y * force);
@@ -98,6 +102,7 @@ class FineSums {
 
   const MotionModel& model_;
   const Block& map_;
+  const Basis fixed_;  ///< known factors that multiply the map
   NormalEquations& to_;
   std::vector<Active> active_;
   int i_ = 0, j_ = 0;
@@ -123,14 +128,19 @@ std::vector<NormalEquations> sums_of(const Fitter& fitter, const FitState& state
   return folds;
 }
 
-/// Whether a block is a smooth map of the speed or of the turn rate.
+bool is_of_place(const Factor& f) { return f.axis.of == Covariate::kX || f.axis.of == Covariate::kY; }
+
+/// Whether a block is a smooth map of the speed or of the turn rate, up to known factors.
 bool is_map(const Block& block) {
-  if ((block.target != Target::kGain && block.target != Target::kTurn) || block.during != kDriven ||
-      block.basis.factors.size() != 1)
-    return false;
-  const Factor& f = block.basis.factors.front();
-  const bool of_place = f.axis.of == Covariate::kX || f.axis.of == Covariate::kY;
-  return of_place && (f.shape == Shape::kCosines2 || f.shape == Shape::kCosines);
+  if ((block.target != Target::kGain && block.target != Target::kTurn) || block.during != kDriven) return false;
+  const Factor* const open = block.basis.only_open();
+  return open != nullptr && open == &block.basis.factors.back() && is_of_place(*open) &&
+         (open->shape == Shape::kCosines2 || open->shape == Shape::kCosines);
+}
+
+/// The known factors that multiply a map.
+std::vector<Factor> fixed_factors(const Block& map) {
+  return {map.basis.factors.begin(), map.basis.factors.end() - 1};
 }
 
 /// The visited area, with cells as fine as the samples are dense.
@@ -179,14 +189,14 @@ Block block_of(const NodeGrid& g, Target target, const Eigen::VectorXd& f) {
 }
 
 /// The term with the fine map in place of its smooth ones.
-Term with_map(const Term& term, const NodeGrid& grid, Target target, const Eigen::VectorXd& f) {
+Term with_map(const Term& term, const Block& map) {
   Term out = term;
   out.blocks.clear();
   std::vector<double> coefficients, precision;
   Eigen::Index first = 0;
   for (const Block& block : term.blocks) {
     const auto n = static_cast<Eigen::Index>(block.basis.size());
-    if (!is_map(block) || block.target != target) {
+    if (!is_map(block) || block.target != map.target) {
       out.blocks.push_back(block);
       for (Eigen::Index i = first; i < first + n; ++i) {
         coefficients.push_back(term.coefficients[i]);
@@ -195,7 +205,7 @@ Term with_map(const Term& term, const NodeGrid& grid, Target target, const Eigen
     }
     first += n;
   }
-  out.blocks.insert(out.blocks.begin(), block_of(grid, target, f));
+  out.blocks.insert(out.blocks.begin(), map);
   coefficients.insert(coefficients.begin(), 1.0);
   precision.insert(precision.begin(), 0.01);
   out.coefficients =
@@ -218,7 +228,8 @@ Eigen::VectorXd sampled(const Term& term, const NodeGrid& grid, Target target) {
       for (const Block& block : term.blocks) {
         const auto n = static_cast<Eigen::Index>(block.basis.size());
         if (is_map(block) && block.target == target) {
-          block.basis.evaluate(s, 0, values.data());
+          const Basis map{{block.basis.factors.back()}, block.basis.chosen};
+          map.evaluate(s, 0, values.data());
           const double own =
               term.coefficients.segment(first, n).dot(Eigen::Map<const Eigen::VectorXd>(values.data(), n));
           gain *= 1 + own;
@@ -239,6 +250,13 @@ struct Fitted {
   Target target;
   Eigen::VectorXd f;
   Variation by;
+  std::vector<Factor> fixed;  ///< known factors that multiply it
+
+  [[nodiscard]] Block block() const {
+    Block product = block_of(grid, target, f);
+    product.basis.factors.insert(product.basis.factors.begin(), fixed.begin(), fixed.end());
+    return product;
+  }
 };
 
 /// Unit of the penalty weight: the root of the information per node.
@@ -303,9 +321,10 @@ void fit_total_variation_map(const Fitter& fitter, FitState& state, std::size_t 
   map.target = first->target;
   map.grid = grid_of(state.tracks);
   if (map.grid.columns < 8 || map.grid.rows < 8) return;
+  map.fixed = fixed_factors(*first);
   map.f = sampled(state.model.terms[place], map.grid, map.target);
   FitState trial = state;
-  trial.model.terms[place] = with_map(state.model.terms[place], map.grid, map.target, map.f);
+  trial.model.terms[place] = with_map(state.model.terms[place], map.block());
   double likelihood = fitter.log_likelihood(state);
   constexpr int kPasses = 3;
   constexpr int kMostNodes = 190;
@@ -313,7 +332,7 @@ void fit_total_variation_map(const Fitter& fitter, FitState& state, std::size_t 
     const bool finer = pass == 2 && std::max(map.grid.columns, map.grid.rows) * 2 - 1 < kMostNodes;
     if (finer) {
       halve(map);
-      trial.model.terms[place].blocks.front() = block_of(map.grid, map.target, map.f);
+      trial.model.terms[place].blocks.front() = map.block();
     }
     const std::vector<NormalEquations> folds =
         sums_of(fitter, trial, trial.model.terms[place].blocks.front(), map.grid);
@@ -337,10 +356,10 @@ void fit_total_variation_map(const Fitter& fitter, FitState& state, std::size_t 
     }
     map.f = solve(all, map.f, map.by, {6, 30});
     FitState next = trial;
-    next.model.terms[place].blocks.front() = block_of(map.grid, map.target, map.f);
+    next.model.terms[place].blocks.front() = map.block();
     fitter.fit(next, 1);
     map.f *= next.model.terms[place].coefficients[0];
-    next.model.terms[place].blocks.front() = block_of(map.grid, map.target, map.f);
+    next.model.terms[place].blocks.front() = map.block();
     next.model.terms[place].coefficients[0] = 1;
     const double found = fitter.log_likelihood(next);
     if (found < likelihood + kLeastMapEvidence) break;

@@ -170,9 +170,10 @@ TEST(History, AnEffectOfPositionIsAlsoTestedOverTime) {
   s.x_mm = -20;
   s.y_mm = 70;
   term.blocks[0].basis.evaluate(s, 0, values.data());
+  // The map is known by its values at nodes, with linear interpolation between them.
   const double there = 0.1 * std::cos(M_PI * 0.4) - 0.3 * std::cos(M_PI * 0.85);
   for (std::size_t k = 0; k < term.blocks[0].basis.size(); ++k)
-    EXPECT_NEAR(values[k], there * std::cos(M_PI * static_cast<double>(k + 1) * 0.25), 1e-12);
+    EXPECT_NEAR(values[k], there * std::cos(M_PI * static_cast<double>(k + 1) * 0.25), 1e-4);
 }
 
 TEST(History, ADriftOverTimeOrPlaceHasAConstantPart) {

@@ -84,6 +84,11 @@ std::vector<Form> forms() {
   Factor amplitudes = over(Shape::kTable, Covariate::kRobot, 0, 1, 1, {3, 5});
   amplitudes.known = {0.6, -0.9};
   amplitudes.plus = 1;
+  Factor switched = over(Shape::kAtLeast, Covariate::kTime, 0, 1, 1, {4, 9});
+  switched.known = {0.8, -0.5};
+  switched.plus = 0.3;
+  Factor known_grid = grid;
+  known_grid.known = {1};
   Factor travelling = over(Shape::kTravelling, Covariate::kX, 0, 1, 2, {0.012, -0.007, 0.3});
   travelling.and_axis.of = Covariate::kY;
   Factor whole_map = map;
@@ -140,6 +145,11 @@ std::vector<Form> forms() {
       {"amounts of a curve", {{over(Shape::kTable, Covariate::kCommand, 0, 1, 1, {1, 2}), known}}},
       {"robots' known amounts of a curve", {{amplitudes, over(Shape::kCosines, Covariate::kTime, 0, 18, 4)}}},
       {"robots' known amounts of a constant", {{amplitudes}}},
+      {"robots, steps and a map", {{amplitudes, switched, map}}},
+      {"robots, steps and a grid", {{amplitudes, switched, grid}}},
+      {"robots, a known grid and harmonics",
+       {{amplitudes, known_grid, over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 2)}}},
+      {"a step of robots times a map", {{over(Shape::kAtLeast, Covariate::kTime, 0, 1, 1, {7}), amplitudes, map}}},
       {"a known curve times harmonics", {{growing, over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 3)}}},
       {"travelling wave", {{travelling}}},
       {"robots' own travelling waves", {{over(Shape::kTable, Covariate::kRobot, 0, 1, 1, {3, 5}), travelling}}},

@@ -1,0 +1,55 @@
+/// Effects that are products of functions of different covariates: a map times an amplitude per robot times a step in time.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "clients/identify/fit/fitter.hpp"
+
+namespace kilotwin::identify {
+
+/// The functions whose product a term is, with their present values: one factor with known coefficients per covariate. Blocks of
+/// further targets do not count. Empty: the term is a constant, or no such product.
+[[nodiscard]] std::vector<Factor> functions_of(const Term&);
+
+/// A term as a product during its fit. One function after the other is open, with its smoothness chosen by evidence, while the
+/// others are fixed.
+class ProductFit {
+ public:
+  /// Puts the product of `functions`, each with known coefficients, in place of a term.
+  ProductFit(const Fitter&, FitState&, std::size_t term, std::vector<Factor> functions);
+
+  /// Fits all functions in turn until they converge. Each gets a rich shape; those of time may become steps, and maps with edges
+  /// grids of values. The function with the richest shape stays open.
+  void fit();
+  /// Complexity of the product: half the log determinants of the posterior precisions of its functions relative to their priors.
+  [[nodiscard]] double cost() const;
+
+ private:
+  [[nodiscard]] Term& term() { return state_.model.terms[place_]; }
+  void turn(std::size_t open, bool rich, int passes);
+  [[nodiscard]] std::vector<Block> blocks_of(std::size_t open, bool rich) const;
+  void became_steps(std::size_t open);
+  void drop_steps(std::size_t open);
+  void choose_place_form(std::size_t open);
+  bool became_grid(std::size_t open);
+  void put_known();
+  void reopen_grid(std::size_t open);
+  void normalise(std::size_t function);
+  void note_cost(std::size_t open);
+
+  const Fitter& fitter_;
+  FitState& state_;
+  std::size_t place_;
+  Target target_;
+  std::uint8_t during_;
+  std::vector<Factor> functions_;  ///< those of one number per key first, the richest last
+  std::vector<double> costs_;
+  bool place_form_chosen_ = false;
+};
+
+/// Replaces a general term over two covariates by the product of two functions if the log likelihood less the complexity rises.
+/// Returns whether it did.
+bool separate(const Fitter&, FitState&, std::size_t term);
+
+}  // namespace kilotwin::identify
