@@ -63,17 +63,26 @@ void Fitter::fit_base(FitState& state) const {
   }
 }
 
-void Fitter::fit(FitState& state, int passes) const {
+void Fitter::fit(FitState& state, int passes) const { fit_passes(state, passes); }
+
+double Fitter::fit_for_likelihood(FitState& state, int passes) const {
+  const std::optional<double> known = fit_passes(state, passes);
+  return known ? *known : log_likelihood(state);
+}
+
+std::optional<double> Fitter::fit_passes(FitState& state, int passes) const {
   // A new camera map changes the positions of walls and of encounters.
   const bool new_camera_map = !state.model.terms.empty() && is_camera_map(state.model.terms.back());
   if (passes > 1 && new_camera_map) fit_camera_distortion(state);
+  std::optional<double> likelihood;
   for (int pass = 0; pass < passes; ++pass) {
     state.tracks.find_headings(state.model, threads_);
     update_walls(state);
     // New terms explain part of the former noise once they have their amplitude.
     if (pass != 0 || passes == 1) fit_noise(state);
-    step(state);
+    likelihood = step(state);
   }
+  return likelihood;
 }
 
 }  // namespace kilotwin::identify

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -35,6 +36,8 @@ class Fitter {
   void fit_contacts(FitState&) const;
   /// Refits base parameters, biases, noise and coefficients. A fitted model needs few passes.
   void fit(FitState&, int passes) const;
+  /// The same. Returns the log_likelihood() of the result, which the last step knows in most cases.
+  double fit_for_likelihood(FitState&, int passes) const;
   /// Refits the noise, on a subset of the tracks.
   void fit_noise(FitState&) const;
   /// Refits the contact noise, on a subset of the tracks.
@@ -76,8 +79,10 @@ class Fitter {
   /// The prior of the base parameters beside the model's terms. Its speeds are nominal ones. The curve of an effect on the speed
   /// leaves open at which values of its covariate they hold: `by_effects` is the standard deviation of the speed there, relative.
   [[nodiscard]] BasePrior prior_beside(const MotionModel&, double by_effects) const;
-  /// One damped Gauss-Newton step in everything but the noise.
-  void step(FitState&) const;
+  /// fit(); returns the log likelihood if the last step knows it.
+  std::optional<double> fit_passes(FitState&, int passes) const;
+  /// One damped Gauss-Newton step in everything but the noise. Returns the log likelihood of the result if it knows it.
+  std::optional<double> step(FitState&) const;
   /// Fits a map of camera distortion without information from contacts. Under distortion walls are not straight,
   /// and encounters are shown in wrong places.
   void fit_camera_distortion(FitState&) const;
@@ -89,8 +94,6 @@ class Fitter {
   void resolve_walls(FitState&) const;
   /// Updates walls from positions where driven robots accumulate. Needs headings.
   void update_walls(FitState&) const;
-  /// Log posterior: log likelihood plus log prior of the coefficients.
-  [[nodiscard]] double log_posterior(const FitState&) const;
   /// Corrects the camera scale by the contact distance. Returns whether it changed.
   static bool correct_camera_scale(FitState&);
   /// Sets the common scale of camera map, speeds and wheel base to its posterior mode. The likelihood is flat

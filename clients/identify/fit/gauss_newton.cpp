@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "clients/identify/fit/fitter.hpp"
 #include "clients/identify/model/camera_scale.hpp"
@@ -19,12 +20,31 @@ struct Equations {
   Eigen::MatrixXd information;
   Eigen::VectorXd score;
   Eigen::VectorXd prior_precision;  ///< prior precisions of the terms' coefficients
+  double log_likelihood = 0;        ///< of the state, as Fitter::log_likelihood()
 };
+
+/// Sum over the tracks, in the order of Fitter::log_likelihood().
+double sum_of(const PreparedSet& tracks, const std::vector<std::vector<const TrackView*>>& of_units,
+              const std::vector<Unit>& units) {
+  std::vector<double> sums(tracks.views().size());
+  for (std::size_t u = 0; u < units.size(); ++u)
+    for (std::size_t t = 0; t < of_units[u].size(); ++t)
+      sums[static_cast<std::size_t>(of_units[u][t] - tracks.views().data())] = units[u].log_likelihood_of_track[t];
+  return std::accumulate(sums.begin(), sums.end(), 0.0);
+}
+
+/// Log likelihood plus log prior of the coefficients.
+double log_posterior(double log_likelihood, const MotionModel& model) {
+  for (const Term& term : model.terms) log_likelihood -= 0.5 * term.precision.dot(term.coefficients.cwiseAbs2());
+  return log_likelihood;
+}
 
 Equations equations_of(const Fitter& fitter, const FitState& state) {
   const MotionModel& model = state.model;
   Equations e;
-  e.units = linearise(model, state.tracks.units(), blocks_of(model), {100, fitter.threads()});
+  const std::vector<std::vector<const TrackView*>> tracks = state.tracks.units();
+  e.units = linearise(model, tracks, blocks_of(model), {100, fitter.threads()});
+  e.log_likelihood = sum_of(state.tracks, tracks, e.units);
   const Eigen::Index n = e.units.front().information.rows();
   e.information = Eigen::MatrixXd::Zero(n, n);
   e.score = e.prior_precision = Eigen::VectorXd::Zero(n);
@@ -138,35 +158,35 @@ void Fitter::apply(MotionModel& model, const std::vector<Unit>& units, const Eig
   model.base.bias_sd_mm_s = std::sqrt(std::max(variance, 0.01));
 }
 
-double Fitter::log_posterior(const FitState& state) const {
-  double value = log_likelihood(state);
-  for (const Term& term : state.model.terms) value -= 0.5 * term.precision.dot(term.coefficients.cwiseAbs2());
-  return value;
-}
-
-void Fitter::step(FitState& state) const {
+std::optional<double> Fitter::step(FitState& state) const {
   const Equations e = equations_of(*this, state);
   // Damps a step that lowers the posterior: first the directions with little information, then the whole step.
   MotionModel& model = state.model;
   const MotionModel start = model;
   const bool camera_fitted = start.measures() && start.walls.any();
-  const double before = log_posterior(state);
+  const double before = log_posterior(e.log_likelihood, model);
   struct Trial {
     double firmness, length;
   };
   constexpr std::array<Trial, 6> kTrials = {{{0, 1}, {10, 1}, {100, 1}, {100, 0.4}, {100, 0.16}, {100, 0.06}}};
   bool better = false;
+  double likelihood = e.log_likelihood;
   for (const Trial& trial : kTrials) {
     Eigen::MatrixXd held = e.information;
     held.diagonal() += trial.firmness * e.prior_precision;
     model = start;
     apply(model, e.units, trial.length * held.ldlt().solve(e.score));
     if (camera_fitted) model.walls = carried(start.walls, start, model);
-    better = log_posterior(state) > before - 2;
-    if (better) break;
+    const double found = log_likelihood(state);
+    better = log_posterior(found, model) > before - 2;
+    if (!better) continue;
+    likelihood = found;
+    break;
   }
   if (!better) model = start;
-  if (model.measures()) choose_camera_scale(state);
+  if (!model.measures()) return likelihood;
+  choose_camera_scale(state);
+  return std::nullopt;
 }
 
 }  // namespace kilotwin::identify

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "clients/identify/fit/contact_gate.hpp"
+#include "clients/identify/fit/likelihood.hpp"
 #include "clients/identify/fit/products.hpp"
 #include "core/os/worker_pool.hpp"
 
@@ -16,8 +17,10 @@ constexpr Eigen::Index kBuffer = 96;  ///< innovation rows that are summed at on
 /// Sensitivities of one track's filter to all columns, and the sums over its innovations.
 class Sensitivities {
  public:
-  Sensitivities(const MotionModel& model, const std::vector<Block>& blocks, const LineariseOptions& options)
-      : model_(model), blocks_(blocks), cluster_s_(options.cluster_s) {
+  /// `needed`: products of all columns, those of the biases last.
+  Sensitivities(const MotionModel& model, const std::vector<Block>& blocks, const LineariseOptions& options,
+                const NeededProducts& needed)
+      : model_(model), blocks_(blocks), needed_(needed), cluster_s_(options.cluster_s) {
     for (std::size_t t = 0; t < model.terms.size(); ++t) {
       Eigen::Index first = 0;
       for (const Block& block : model.terms[t].blocks) {
@@ -25,21 +28,28 @@ class Sensitivities {
         first += static_cast<Eigen::Index>(block.basis.size());
       }
     }
-    columns_ = kBaseColumns;
-    for (const Block& block : blocks) columns_ += static_cast<Eigen::Index>(block.basis.size());
-    all_ = columns_ + 2;
+    columns_ = columns_of(blocks);
+    all_ = columns_ + kBiases;
     pose_.setZero(3, all_);
     seen_.setZero(3, all_);
     information_.setZero(all_, all_);
     buffer_.resize(kBuffer, all_);
     values_.resize(kBuffer);
     for (const Block& block : blocks) measures_ = measures_ || is_measured(block.target);
+    share_bases();
   }
 
+  static constexpr Eigen::Index kBiases = 2;  ///< columns after the others
+  [[nodiscard]] static Eigen::Index columns_of(const std::vector<Block>& blocks) {
+    Eigen::Index columns = kBaseColumns;
+    for (const Block& block : blocks) columns += static_cast<Eigen::Index>(block.basis.size());
+    return columns;
+  }
   [[nodiscard]] Eigen::Index columns() const { return columns_; }
   void begin_track(const TrackView& view) {
     run_ = view.run;
     cluster_start_s_ = -1e300;
+    likelihood_ = {};
     first_ = &view.track->samples.front();
     last_ = view.at(first_->time_s);
   }
@@ -59,10 +69,12 @@ class Sensitivities {
     const Rates& r = record.rates;
     const Arc& arc = record.arc;
     const double h = record.h_s, base = model_.base.wheel_base_mm;
+    ++instant_;
     const double by_heading_x = -(arc.dy_mm - r.drift_y_mm_s * h), by_heading_y = arc.dx_mm - r.drift_x_mm_s * h;
     add_row({by_heading_x, by_heading_y, 0}, pose_.row(2).data(), all_, pose_, 0);
     last_ = record.middle;
     in_contact_.step(record);
+    likelihood_.step(record);
     const double forward = r.forward_mm_s() * h;
     const Eigen::Vector3d turn = h * Eigen::Vector3d(-arc.along_y * forward / 2, arc.along_x * forward / 2, 1);
     const Eigen::Vector3d ahead = h * Eigen::Vector3d(arc.along_x, arc.along_y, 0);
@@ -82,23 +94,19 @@ class Sensitivities {
     Wheels replaced;
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
       const Block& block = blocks_[b];
-      const auto n = static_cast<Eigen::Index>(block.basis.size());
-      const Eigen::Index first = c;
+      const Eigen::Index n = shared_[b].columns, first = c;
       c += n;
       if (is_measured(block.target) || (block.during >> static_cast<int>(commands.command) & 1) == 0) continue;
-      block.basis.evaluate(record.middle, 0, of_left_);
+      if (block.basis.lacks_key(record.middle)) continue;
+      const double* const left_values = values_of(b, record.middle, 0);
       const auto add = [&](const Eigen::Vector3d& force, const double* values) {
         add_row(force, values, n, pose_, first);
       };
-      const double* right_values = of_left_;
-      if (block.basis.per_wheel()) {
-        block.basis.evaluate(record.middle, 1, of_right_);
-        right_values = of_right_;
-      }
+      const double* const right_values = shared_[b].per_wheel ? values_of(b, record.middle, 1) : left_values;
       // Gains are factors: a term's columns do not act on the term's own gain.
       Wheels without = replaced;
       if (b < own_.size()) {
-        without = own_gains(b, of_left_, right_values);
+        without = own_gains(b, left_values, right_values);
         if (own_[b].replaced) {
           replaced.left *= without.left;
           replaced.right *= without.right;
@@ -108,23 +116,23 @@ class Sensitivities {
                    gained_right = r.right_base_mm_s * r.right_gain / without.right;
       switch (block.target) {
         case Target::kGain:
-          if (right_values == of_left_) {
-            add(left * gained_left + right * gained_right, of_left_);
+          if (right_values == left_values) {
+            add(left * gained_left + right * gained_right, left_values);
           } else {
-            add(left * gained_left, of_left_);
+            add(left * gained_left, left_values);
             add(right * gained_right, right_values);
           }
           break;
-        case Target::kGainLeft: add(left * gained_left, of_left_); break;
+        case Target::kGainLeft: add(left * gained_left, left_values); break;
         case Target::kGainRight: add(right * gained_right, right_values); break;
-        case Target::kOffset: add(ahead, of_left_); break;
-        case Target::kOffsetLeft: add(left, of_left_); break;
+        case Target::kOffset: add(ahead, left_values); break;
+        case Target::kOffsetLeft: add(left, left_values); break;
         case Target::kOffsetRight: add(right, right_values); break;
-        case Target::kTurn: add(turn, of_left_); break;
-        case Target::kAhead: add(ahead, of_left_); break;
-        case Target::kSideways: add(sideways, of_left_); break;
-        case Target::kWorldX: add({h, 0, 0}, of_left_); break;
-        case Target::kWorldY: add({0, h, 0}, of_left_); break;
+        case Target::kTurn: add(turn, left_values); break;
+        case Target::kAhead: add(ahead, left_values); break;
+        case Target::kSideways: add(sideways, left_values); break;
+        case Target::kWorldX: add({h, 0, 0}, left_values); break;
+        case Target::kWorldY: add({0, h, 0}, left_values); break;
         default: break;
       }
     }
@@ -132,8 +140,7 @@ class Sensitivities {
   void update(const Innovation& innovation, const Sample& sample) {
     const ContactGate::Counts counts = in_contact_.update(innovation);
     const bool heading_only = counts == ContactGate::Counts::kHeading;
-    if (counts == ContactGate::Counts::kAll) log_likelihood += innovation.log_likelihood;
-    if (heading_only) log_likelihood += heading_log_likelihood(innovation);
+    likelihood_.update(innovation, sample);
     ++samples;
     if (innovation.weight < 1) ++outliers;
     // Otherwise the sensitivities start at zero again.
@@ -163,7 +170,7 @@ class Sensitivities {
   void flush() {
     if (filled_ == 0) return;
     const auto rows = buffer_.topRows(filled_);
-    add_products(buffer_, filled_, information_);
+    add_products(buffer_, filled_, needed_, information_);
     clusters_.back().noalias() += rows.transpose() * values_.head(filled_);
     filled_ = 0;
   }
@@ -193,13 +200,13 @@ class Sensitivities {
     unit.bias_step = unit.bias_covariance * bias_score;
     unit.score = unit.cluster_scores.rowwise().sum();
     unit.cluster_run = cluster_run;
-    unit.log_likelihood = log_likelihood;
     unit.samples = samples;
     unit.outliers = outliers;
     unit.lost = lost;
   }
 
-  double log_likelihood = 0;
+  [[nodiscard]] double log_likelihood_of_track() const { return likelihood_.sum; }
+
   std::size_t samples = 0, outliers = 0, lost = 0;
   std::vector<std::uint32_t> cluster_run;
 
@@ -226,6 +233,31 @@ class Sensitivities {
     const bool both = block.target == Target::kGain;
     return {both || block.target == Target::kGainLeft ? factor(left) : 1,
             both || block.target == Target::kGainRight ? factor(right) : 1};
+  }
+  void share_bases() {
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      std::size_t first = 0;
+      while (!(blocks_[first].basis == blocks_[b].basis)) ++first;
+      const Basis& basis = blocks_[b].basis;
+      shared_.push_back({first, static_cast<Eigen::Index>(basis.size()), false, basis.per_wheel()});
+      if (first == b) continue;
+      shared_[first].used_again = true;
+      shared_[first].left.resize(kMostColumns);
+    }
+  }
+  /// The columns of a block at the present instant, valid until the next call for the same wheel.
+  const double* values_of(std::size_t b, const Situation& at, std::size_t wheel) {
+    Shared& shared = shared_[shared_[b].first];
+    if (wheel == 1 || !shared.used_again) {
+      double* const to = wheel == 0 ? of_left_ : of_right_;
+      blocks_[b].basis.evaluate(at, wheel, to);
+      return to;
+    }
+    if (shared.instant != instant_) {
+      blocks_[b].basis.evaluate(at, wheel, shared.left.data());
+      shared.instant = instant_;
+    }
+    return shared.left.data();
   }
   /// At the start the robot is at its measured position for any coefficients, so the measurement effect moves the
   /// pose.
@@ -267,12 +299,14 @@ class Sensitivities {
     const BaseParameters& base = model_.base;
     const double point_x = pose[0] + base.ahead_mm * c - base.left_mm * s,
                  point_y = pose[1] + base.ahead_mm * s + base.left_mm * c;
+    ++instant_;
     Eigen::Index first = kBaseColumns;
-    for (const Block& block : blocks_) {
-      const auto n = static_cast<Eigen::Index>(block.basis.size());
-      if (is_measured(block.target) && (block.during >> static_cast<int>(at.commands.command) & 1) != 0) {
-        block.basis.evaluate(at, 0, of_left_);
-        const Eigen::Map<const Eigen::RowVectorXd> row(of_left_, n);
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      const Block& block = blocks_[b];
+      const Eigen::Index n = shared_[b].columns;
+      if (is_measured(block.target) && (block.during >> static_cast<int>(at.commands.command) & 1) != 0 &&
+          !block.basis.lacks_key(at)) {
+        const Eigen::Map<const Eigen::RowVectorXd> row(values_of(b, at, 0), n);
         const auto add = [&](double x, double y, double turn) {
           if (x != 0) seen_.row(0).segment(first, n) += x * row;
           if (y != 0) seen_.row(1).segment(first, n) += y * row;
@@ -294,6 +328,7 @@ class Sensitivities {
 
   const MotionModel& model_;
   const std::vector<Block>& blocks_;
+  const NeededProducts& needed_;
   std::vector<Own> own_;  ///< of the first blocks
   const double cluster_s_;
   Eigen::Index columns_ = 0, all_ = 0, filled_ = 0;
@@ -308,7 +343,18 @@ class Sensitivities {
   const Sample* first_ = nullptr;  ///< first sample of the track
   Situation last_;
   ContactGate in_contact_;
+  LogLikelihood likelihood_;  ///< of the track
   bool measures_ = false;
+  /// Blocks with the same basis share its columns: those of the first of them.
+  struct Shared {
+    std::size_t first;  ///< index of the first block with the basis
+    Eigen::Index columns;
+    bool used_again, per_wheel;
+    std::uint64_t instant = 0;      ///< for which `left` holds the columns
+    std::vector<double> left = {};  ///< of the first block, if it is used again
+  };
+  std::vector<Shared> shared_;  ///< by block
+  std::uint64_t instant_ = 0;   ///< number of the present step or update
   double of_left_[kMostColumns], of_right_[kMostColumns];
 };
 
@@ -326,8 +372,13 @@ void count_work(const TrackView& view, Eigen::Index columns) {
 std::vector<Unit> linearise(const MotionModel& model, const std::vector<std::vector<const TrackView*>>& units,
                             const std::vector<Block>& blocks, const LineariseOptions& options) {
   std::vector<Unit> out(units.size());
+  const Eigen::Index all = Sensitivities::columns_of(blocks) + Sensitivities::kBiases;
+  const NeededProducts needed =
+      options.needed == nullptr
+          ? NeededProducts(all)
+          : NeededProducts(all, options.needed->groups, options.needed->with_all, Sensitivities::kBiases);
   os::in_parallel(units.size(), options.threads, [&](std::size_t u) {
-    Sensitivities sums(model, blocks, options);
+    Sensitivities sums(model, blocks, options, needed);
     RobotBias bias;
     for (const TrackView* view : units[u]) {
       out[u].robot = view->track->robot;
@@ -338,6 +389,7 @@ std::vector<Unit> linearise(const MotionModel& model, const std::vector<std::vec
       sums.begin_track(*view);
       run_filter(filter, *view, view->track->samples.size(), sums);
       sums.flush();
+      out[u].log_likelihood_of_track.push_back(sums.log_likelihood_of_track());
       count_work(*view, sums.columns());
     }
     const double sd = model.base.bias_sd_mm_s;

@@ -18,16 +18,23 @@ enum BaseColumn { kStraightSpeed, kTurnSpeed, kWheelBase, kAheadPoint, kLeftPoin
 /// Linearisation of one robot, or of one track if robots are few. Its biases are eliminated.
 struct Unit {
   std::uint32_t robot = 0;
-  Eigen::MatrixXd information;     ///< columns x columns
+  Eigen::MatrixXd information;     ///< columns x columns; only entries of ColumnGroups are defined
   Eigen::VectorXd score;           ///< sum over clusters
   Eigen::MatrixXd cluster_scores;  ///< one column per cluster
   std::vector<std::uint32_t> cluster_run;
   // Change of the biases: bias_step - bias_by_column * (change of the columns).
   Eigen::Vector2d bias_step;
-  Eigen::MatrixXd bias_by_column;   ///< 2 x columns
-  Eigen::Matrix2d bias_covariance;  ///< with the columns fixed
-  double log_likelihood = 0;
+  Eigen::MatrixXd bias_by_column;               ///< 2 x columns
+  Eigen::Matrix2d bias_covariance;              ///< with the columns fixed
+  std::vector<double> log_likelihood_of_track;  ///< of likelihood_of(), in the order of the unit's tracks
   std::size_t samples = 0, outliers = 0, lost = 0;
+};
+
+/// The entries of the information that are needed: those within each group of columns, and those of the first
+/// `with_all` columns with all.
+struct ColumnGroups {
+  Eigen::Index with_all = 0;
+  std::vector<std::vector<Eigen::Index>> groups;
 };
 
 struct LineariseOptions {
@@ -35,6 +42,7 @@ struct LineariseOptions {
   std::uint32_t threads = 2;
   /// Index of a term that the blocks after the model's replace; below 0: they are added to all terms.
   int instead_of = -1;
+  const ColumnGroups* needed = nullptr;  ///< null: all entries of the information
 };
 
 /// units[i] are the tracks of unit i. Columns: BaseColumn, then the blocks in order.

@@ -7,7 +7,8 @@
 namespace kilotwin::identify {
 namespace {
 
-constexpr Eigen::Index kLanes = 8, kStrip = 2 * kLanes, kColumns = 8;
+constexpr Eigen::Index kLanes = 8, kStrip = NeededProducts::kStrip, kColumns = NeededProducts::kPanel;
+static_assert(kStrip == 2 * kLanes && kColumns == kLanes);
 using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
 
 /// One strip of rows of `sums` by some columns, in registers. Unrolled by hand, since compilers keep the array in
@@ -29,25 +30,40 @@ inline __attribute__((always_inline)) void strip(const double* rows, Eigen::Inde
   (std::memcpy(sums + column * n + kLanes, &high[column], sizeof(Lanes)), ...);
 }
 
+/// Some rows of `sums` by the columns of a panel, which lie in the lanes.
+template <Eigen::Index... row>
+inline __attribute__((always_inline)) void single_rows(const double* rows, Eigen::Index count, Eigen::Index n,
+                                                       double* sums, const double* by,
+                                                       std::integer_sequence<Eigen::Index, row...>) {
+  Lanes sum[sizeof...(row)];
+  for (Eigen::Index c = 0; c < kColumns; ++c) ((sum[row][c] = sums[c * n + row]), ...);
+  for (Eigen::Index k = 0; k < count; ++k, rows += n, by += n) {
+    Lanes panel;
+    std::memcpy(&panel, by, sizeof(Lanes));
+    ((sum[row] += panel * rows[row]), ...);
+  }
+  for (Eigen::Index c = 0; c < kColumns; ++c) ((sums[c * n + row] = sum[row][c]), ...);
+}
+
 inline __attribute__((always_inline)) void add(const double* rows, Eigen::Index count, Eigen::Index n,
-                                               double* sums) {
-  for (Eigen::Index j = 0; j < n; j += kColumns) {
-    const Eigen::Index columns = std::min(kColumns, n - j);
-    Eigen::Index i = j;
-    for (; i + kStrip <= n; i += kStrip) {
-      if (columns == kColumns) {
-        strip(rows + i, count, n, sums + j * n + i, rows + j, std::make_integer_sequence<Eigen::Index, kColumns>());
-      } else {
-        for (Eigen::Index c = j; c < n; ++c)
-          strip(rows + i, count, n, sums + c * n + i, rows + c, std::make_integer_sequence<Eigen::Index, 1>());
-      }
-    }
-    for (Eigen::Index c = 0; c < columns; ++c) {
-      for (Eigen::Index rest = i; rest < n; ++rest) {
-        double sum = sums[(j + c) * n + rest];
-        for (Eigen::Index k = 0; k < count; ++k) sum += rows[k * n + rest] * rows[k * n + j + c];
-        sums[(j + c) * n + rest] = sum;
-      }
+                                               const NeededProducts& needed, double* sums) {
+  using std::make_integer_sequence;
+  for (Eigen::Index j = 0; j + kColumns <= n; j += kColumns) {
+    double* const panel = sums + j * n;
+    for (const Eigen::Index i : needed.strips(j / kColumns))
+      strip(rows + i, count, n, panel + i, rows + j, make_integer_sequence<Eigen::Index, kColumns>());
+    // The rows after the last whole strip.
+    Eigen::Index i = n - (n - j) % kStrip;
+    for (; i + 4 <= n; i += 4)
+      single_rows(rows + i, count, n, panel + i, rows + j, make_integer_sequence<Eigen::Index, 4>());
+    for (; i < n; ++i)
+      single_rows(rows + i, count, n, panel + i, rows + j, make_integer_sequence<Eigen::Index, 1>());
+  }
+  for (Eigen::Index c = n - n % kColumns; c < n; ++c) {
+    for (Eigen::Index i = c; i < n; ++i) {
+      double sum = sums[c * n + i];
+      for (Eigen::Index k = 0; k < count; ++k) sum += rows[k * n + i] * rows[k * n + c];
+      sums[c * n + i] = sum;
     }
   }
 }
@@ -73,7 +89,7 @@ inline __attribute__((always_inline)) void combine(const double* by, const doubl
   }
 }
 
-using Add = void (*)(const double*, Eigen::Index, Eigen::Index, double*);
+using Add = void (*)(const double*, Eigen::Index, Eigen::Index, const NeededProducts&, double*);
 using Combine = void (*)(const double*, const double*, Eigen::Index, Eigen::Index, double*);
 
 /// The kernels for one instruction set.
@@ -84,8 +100,9 @@ struct Kernels {
 
 #define KILOTWIN_KERNELS(name, instructions)                                                                    \
   struct name {                                                                                                 \
-    instructions static void add(const double* rows, Eigen::Index count, Eigen::Index n, double* sums) {        \
-      identify::add(rows, count, n, sums);                                                                      \
+    instructions static void add(const double* rows, Eigen::Index count, Eigen::Index n,                        \
+                                 const NeededProducts& needed, double* sums) {                                  \
+      identify::add(rows, count, n, needed, sums);                                                              \
     }                                                                                                           \
     template <int terms, bool onto>                                                                             \
     instructions static void combine(const double* by, const double* from, Eigen::Index stride, Eigen::Index n, \
@@ -117,8 +134,39 @@ using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 }  // namespace
 
-void add_products(const RowMajorMatrix& rows, Eigen::Index count, Eigen::MatrixXd& sums) {
-  kFastest.add(rows.data(), count, rows.cols(), sums.data());
+NeededProducts::NeededProducts(Eigen::Index n) {
+  for (Eigen::Index j = 0; j + kPanel <= n; j += kPanel) {
+    std::vector<Eigen::Index>& strips = strips_.emplace_back();
+    for (Eigen::Index i = j; i + kStrip <= n; i += kStrip) strips.push_back(i);
+  }
+}
+
+NeededProducts::NeededProducts(Eigen::Index n, const std::vector<std::vector<Eigen::Index>>& groups,
+                               Eigen::Index first, Eigen::Index last) {
+  // Panels are needed with panels: those before and including the diagonal.
+  const Eigen::Index panels = (n + kPanel - 1) / kPanel;
+  Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> with =
+      Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic>::Constant(panels, panels, false);
+  for (const std::vector<Eigen::Index>& group : groups) {
+    std::vector<Eigen::Index> own;
+    for (const Eigen::Index column : group) own.push_back(column / kPanel);
+    std::sort(own.begin(), own.end());
+    own.erase(std::unique(own.begin(), own.end()), own.end());
+    for (const Eigen::Index a : own)
+      for (const Eigen::Index b : own) with(a, b) = true;
+  }
+  if (first > 0) with.leftCols((first - 1) / kPanel + 1).setConstant(true);
+  if (last > 0) with.bottomRows(panels - (n - last) / kPanel).setConstant(true);
+  for (Eigen::Index j = 0; j + kPanel <= n; j += kPanel) {
+    std::vector<Eigen::Index>& strips = strips_.emplace_back();
+    for (Eigen::Index i = j; i + kStrip <= n; i += kStrip)
+      if (with(i / kPanel, j / kPanel) || with(i / kPanel + 1, j / kPanel)) strips.push_back(i);
+  }
+}
+
+void add_products(const RowMajorMatrix& rows, Eigen::Index count, const NeededProducts& needed,
+                  Eigen::MatrixXd& sums) {
+  kFastest.add(rows.data(), count, rows.cols(), needed, sums.data());
 }
 
 void put_combined(const Eigen::Matrix3d& by, const PoseRows& from, Eigen::Index count, double* to) {

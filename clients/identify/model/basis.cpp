@@ -186,6 +186,13 @@ std::size_t Basis::size() const {
   return size;
 }
 
+bool Basis::lacks_key(const Situation& s) const {
+  return std::any_of(factors.begin(), factors.end(), [&](const Factor& f) {
+    return f.shape == Factor::Shape::kTable && f.known.empty() &&
+           std::find(f.points.begin(), f.points.end(), value_of(f.axis, s, 0)) == f.points.end();
+  });
+}
+
 void Basis::evaluate(const Situation& s, std::size_t wheel, double* to) const {
   to[0] = 1;
   std::size_t have = 1;
@@ -201,8 +208,15 @@ void Basis::evaluate(const Situation& s, std::size_t wheel, double* to) const {
     KILOTWIN_DEMAND(have * n <= kMostColumns);
     factor.evaluate(s, wheel, of_factor.data());
     // From the last column on, so that no column is overwritten before it is read.
-    for (std::size_t i = have; i-- > 0;)
-      for (std::size_t j = n; j-- > 0;) to[i * n + j] = to[i] * of_factor[j];
+    for (std::size_t i = have; i-- > 0;) {
+      const double by = to[i];
+      if (by == 0) {
+        // Nearly all columns of a table.
+        std::fill_n(to + i * n, n, 0.0);
+      } else {
+        for (std::size_t j = n; j-- > 0;) to[i * n + j] = by * of_factor[j];
+      }
+    }
     have *= n;
   }
   for (std::size_t i = 0; i < chosen.size(); ++i) to[i] = to[chosen[i]];

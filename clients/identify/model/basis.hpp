@@ -50,6 +50,7 @@ struct Factor {
   void evaluate(const Situation&, std::size_t wheel, double* to) const;
   /// Roughness of each column, 1 for the smoothest. The prior variance falls with the roughness.
   [[nodiscard]] std::vector<double> roughness() const;
+  bool operator==(const Factor&) const = default;
 
  private:
   void evaluate_columns(const Situation&, std::size_t wheel, double* to) const;
@@ -64,6 +65,8 @@ struct Basis {
   std::vector<std::uint32_t> chosen = {};
 
   [[nodiscard]] std::size_t size() const;
+  /// Whether all columns are 0 because a table lacks the present key: the cheap test before evaluate().
+  [[nodiscard]] bool lacks_key(const Situation&) const;
   /// `to` has room for all products.
   void evaluate(const Situation&, std::size_t wheel, double* to) const;
   [[nodiscard]] std::vector<double> roughness() const;
@@ -73,6 +76,7 @@ struct Basis {
   [[nodiscard]] Factor* only_open();
   /// Whether the left and the right wheel have different values.
   [[nodiscard]] bool per_wheel() const { return looks_at(Covariate::kMotorTime); }
+  bool operator==(const Basis&) const = default;
 };
 
 inline constexpr std::size_t kMostColumns = 160;  ///< upper bound of the columns of one basis

@@ -37,19 +37,27 @@ Eigen::Vector2d nominal_speeds(const BaseParameters& base, Motion motion) {
 namespace {
 
 /// Calls take(block, sum) for the blocks that act under a command: those of the measurement model, or of the motion model.
-/// sum(situation, wheel): the weighted sum of the block's columns.
+/// sum(wheel): the weighted sum of the block's columns in a situation. Blocks whose columns are all 0 may be left out.
 template <class Take>
-void for_each_block(const std::vector<Term>& terms, Motion command, bool measured, Take&& take) {
+void for_each_block(const std::vector<Term>& terms, const Situation& s, bool measured, Take&& take) {
   std::array<double, kMostColumns> columns;
+  const Basis* held = nullptr;  // whose columns at the left wheel are there
   for (const Term& term : terms) {
     const double* coefficients = term.coefficients.data();
     for (const Block& block : term.blocks) {
       const auto n = static_cast<Eigen::Index>(block.basis.size());
       const Eigen::Map<const Eigen::VectorXd> own(coefficients, n);
       coefficients += n;
-      if (is_measured(block.target) != measured || (block.during >> static_cast<int>(command) & 1) == 0) continue;
-      take(block, [&](const Situation& s, std::size_t wheel) {
-        block.basis.evaluate(s, wheel, columns.data());
+      if (is_measured(block.target) != measured || (block.during >> static_cast<int>(s.commands.command) & 1) == 0)
+        continue;
+      if (block.basis.lacks_key(s)) continue;
+      take(block, [&](std::size_t wheel) {
+        // Blocks of a term often have the same basis: both axes of a drift, for example.
+        constexpr Eigen::Index kWorthIt = 8;
+        if (n < kWorthIt || wheel != 0 || held == nullptr || !(*held == block.basis)) {
+          block.basis.evaluate(s, wheel, columns.data());
+          held = wheel == 0 ? &block.basis : nullptr;
+        }
         return Eigen::Map<const Eigen::VectorXd>(columns.data(), n).dot(own);
       });
     }
@@ -97,9 +105,9 @@ Rates MotionModel::rates(const Situation& s, const Eigen::Vector2d& bias_mm_s) c
     r.right_base_mm_s = v[1];
   }
   MotionChange change;
-  for_each_block(terms, s.commands.command, false, [&](const Block& block, const auto& sum) {
-    const double left = sum(s, 0);
-    add(block, left, block.basis.per_wheel() ? sum(s, 1) : left, base.wheel_base_mm, change, r);
+  for_each_block(terms, s, false, [&](const Block& block, const auto& sum) {
+    const double left = sum(0);
+    add(block, left, block.basis.per_wheel() ? sum(1) : left, base.wheel_base_mm, change, r);
   });
   static_cast<DriveSpeeds&>(r) = changed_speeds(r.left_base_mm_s, r.right_base_mm_s, change, kEffectsLimit_mm_s);
   r.left_gain = change.left_gain;
@@ -130,8 +138,8 @@ Eigen::Vector3d MotionModel::measured(double x_mm, double y_mm, double heading_r
     there.x_mm = x_mm + base.centre_mm * c;
     there.y_mm = y_mm + base.centre_mm * s;
     there.heading_rad = heading_rad;
-    for_each_block(terms, at.commands.command, true, [&](const Block& block, const auto& sum) {
-      const double v = sum(there, 0);
+    for_each_block(terms, there, true, [&](const Block& block, const auto& sum) {
+      const double v = sum(0);
       switch (block.target) {
         case Target::kMeasuredX: x += v; break;
         case Target::kMeasuredY: y += v; break;

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "clients/identify/search/local_quadratic.hpp"
@@ -281,6 +282,10 @@ std::string find_change_points(const Fitter& fitter, FitState& state, std::size_
   // On the raster the gain is approximate. The decision follows after the refinement.
   FitState best = state;
   double best_gain = 0;
+  struct Known {
+    double log_likelihood, bends;
+  };
+  std::optional<Known> had;  // of the state as it was
   for (std::size_t f = 0; f < forms.size(); ++f) {
     Steps& form = forms[f];
     constexpr double kBetter = 2;
@@ -290,12 +295,15 @@ std::string find_change_points(const Fitter& fitter, FitState& state, std::size_
     FitState trial = state;
     if (!put_steps(fitter, trial, place, form, apart_s)) continue;
     if (other) trial.model.terms[place].name = in_world ? "camera-by-time" : "drift-by-time";
-    fitter.fit(trial, 2);
-    if (form.beside) refit(fitter, trial, place);
+    double likelihood = fitter.fit_for_likelihood(trial, 2);
+    if (form.beside) {
+      refit(fitter, trial, place);
+      likelihood = fitter.log_likelihood(trial);
+    }
     // Price of a step: the choice of its time, and its size. Price of a curve: its complexity.
     const double price = std::log(static_cast<double>(points.size())) + 3 * static_cast<double>(form.kinds.size());
-    const double curve = form.beside ? 0 : bends(fitter, state, place);
-    const double gain = fitter.log_likelihood(trial) - fitter.log_likelihood(state) + curve -
+    if (!had) had = Known{fitter.log_likelihood(state), bends(fitter, state, place)};
+    const double gain = likelihood - had->log_likelihood + (form.beside ? 0 : had->bends) -
                         price * static_cast<double>(form.at_s.size());
     // Without clear evidence the target stays.
     constexpr double kSurelyOther = 3;

@@ -95,6 +95,16 @@ Eigen::MatrixXd whitening(const Eigen::MatrixXd& information, const Eigen::Vecto
 
 }  // namespace
 
+ColumnGroups columns_read_by_test(const MotionModel& model, const Dictionary& dictionary) {
+  ColumnGroups read{kBaseColumns, {}};
+  for (const Term& term : model.terms) read.with_all += term.coefficients.size();
+  for (const Hypothesis& hypothesis : dictionary.hypotheses) {
+    std::vector<Eigen::Index>& group = read.groups.emplace_back();
+    for (const Eigen::Index column : hypothesis.columns) group.push_back(read.with_all + column);
+  }
+  return read;
+}
+
 struct ScoreTest::Reduced {
   Eigen::MatrixXd information;
   Eigen::VectorXd score;

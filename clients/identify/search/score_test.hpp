@@ -24,10 +24,14 @@ struct Finding {
   double held_out = 0;        ///< cross-validated gain in log likelihood
 };
 
+/// The entries of the information that a ScoreTest reads.
+[[nodiscard]] ColumnGroups columns_read_by_test(const MotionModel&, const Dictionary&);
+
 /// Score test of all columns of a dictionary, given a model.
 class ScoreTest {
  public:
-  /// `units`: linearised with the model's blocks first and the dictionary's after them.
+  /// `units`: linearised with the model's blocks first and the dictionary's after them, at least the entries of
+  /// columns_read_by_test().
   ScoreTest(const Fitter&, const MotionModel&, const std::vector<Unit>& units, const Dictionary&);
 
   struct Outcome {

@@ -177,7 +177,9 @@ class Loop {
     dictionary_ = dictionary_of(extent_, out_.fit.model.terms);
     std::vector<Block> blocks = blocks_of(out_.fit.model);
     blocks.insert(blocks.end(), dictionary_.blocks.begin(), dictionary_.blocks.end());
-    const std::vector<Unit> units = linearise(out_.fit.model, tested_units(), blocks, {100, fitter_.threads()});
+    const ColumnGroups read = columns_read_by_test(out_.fit.model, dictionary_);
+    const std::vector<Unit> units =
+        linearise(out_.fit.model, tested_units(), blocks, {100, fitter_.threads(), -1, &read});
     score_test_.emplace(fitter_, out_.fit.model, units, dictionary_);
   }
   const Finding* best_of(const ScoreTest::Outcome& outcome, double least_evidence) const {
@@ -230,8 +232,9 @@ class Loop {
                       std::map<std::string, GeneralTerm>& best) {
     std::vector<Block> blocks = blocks_of(out_.fit.model);
     blocks.insert(blocks.end(), family.blocks.begin(), family.blocks.end());
+    const ColumnGroups read = columns_read_by_test(out_.fit.model, family);
     const std::vector<Unit> units =
-        linearise(out_.fit.model, tested_units(kEnoughForGeneral), blocks, {100, fitter_.threads()});
+        linearise(out_.fit.model, tested_units(kEnoughForGeneral), blocks, {100, fitter_.threads(), -1, &read});
     const ScoreTest test(fitter_, out_.fit.model, units, family);
     const ScoreTest::Outcome outcome = test.test(kSeed + 100 + static_cast<std::uint64_t>(round_));
     for (const Finding& f : outcome.findings) {

@@ -372,8 +372,7 @@ void fit_smoothly(const Fitter& fitter, FitState& state, std::size_t place, cons
     } else {
       term.precision = held.array().square().inverse();
     }
-    fitter.fit(state, 1);
-    const double now = fitter.log_likelihood(state);
+    const double now = fitter.fit_for_likelihood(state, 1);
     const bool last = pass + 1 == passes || now < likelihood + kSettled;
     likelihood = now;
     if (!last) continue;

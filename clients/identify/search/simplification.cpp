@@ -315,8 +315,8 @@ bool simplify(const Fitter& fitter, FitState& state, std::size_t place) {
     }
     put_best(fitter, simple, place, finer, true);
   }
-  fitter.fit(simple, 2);
-  const double lost = fitter.log_likelihood(state) - fitter.log_likelihood(simple);
+  const double likelihood = fitter.fit_for_likelihood(simple, 2);
+  const double lost = fitter.log_likelihood(state) - likelihood;
   if (lost > cost_of(fitter, state, place) - cost_of(fitter, simple, place) + kMostEvidenceLost) return false;
   state = std::move(simple);
   return true;

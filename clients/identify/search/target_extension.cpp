@@ -162,8 +162,7 @@ void extend_targets(const Fitter& fitter, FitState& state, std::size_t place) {
     term.coefficients.tail(chosen->size()).setZero();
     term.precision.conservativeResize(had + chosen->size());
     term.precision.tail(chosen->size()) = chosen_sd.array().square().inverse();
-    fitter.fit(trial, 2);
-    if (fitter.log_likelihood(trial) <= fitter.log_likelihood(state) + kLeastGain) return;
+    if (fitter.fit_for_likelihood(trial, 2) <= fitter.log_likelihood(state) + kLeastGain) return;
     state = std::move(trial);
   }
 }

@@ -9,6 +9,7 @@
 
 #include "clients/identify/search/dictionary_builder.hpp"
 #include "clients/identify/search/local_quadratic.hpp"
+#include "clients/identify/search/phasor_sums.hpp"
 #include "clients/identify/search/visits.hpp"
 #include "core/os/worker_pool.hpp"
 
@@ -150,9 +151,10 @@ class Periodogram {
     else
       at *= x;
     Peak best{{i * raster_.step[0], j * raster_.step[1], 0}, 0};
+    std::vector<std::complex<double>> sums(2 * static_cast<std::size_t>(raster_.steps) + 1);
+    add_phasor_sums(at, by_, sums);
     for (int w = -raster_.steps; w <= raster_.steps; ++w) {
-      const double power = 0.5 * std::norm(at.sum()) / information_;
-      at *= by_;
+      const double power = 0.5 * std::norm(sums[static_cast<std::size_t>(w + raster_.steps)]) / information_;
       // A wave that stands still is a map; robots and biases absorb what is constant.
       if (w == 0 || power <= best.power) continue;
       best.wave[2] = w * raster_.step[2];
@@ -202,8 +204,7 @@ bool stand_still(const Fitter& fitter, FitState& state, std::size_t place, doubl
   Term& term = trial.model.terms[place];
   wave_of(term)->points[2] = 0;
   term.name = "speed-by-position";
-  fitter.fit(trial, 2);
-  if (!(fitter.log_likelihood(trial) > likelihood - kMostLost)) return false;
+  if (!(fitter.fit_for_likelihood(trial, 2) > likelihood - kMostLost)) return false;
   state = std::move(trial);
   return true;
 }
@@ -238,8 +239,7 @@ bool refine_wave_numbers(const Fitter& fitter, FitState& state, std::size_t plac
       for (std::size_t d = 0; d < numbers.size(); ++d)
         numbers[d] +=
             (d == 2 ? -1 : 1) * length * step[static_cast<Eigen::Index>(d)] / (along[d].high - along[d].low);
-      fitter.fit(trial, 2);
-      const double found = fitter.log_likelihood(trial);
+      const double found = fitter.fit_for_likelihood(trial, 2);
       // Negated, so that a likelihood that is no number is no progress.
       if (!(found > likelihood + kSettled)) continue;
       likelihood = found;

@@ -1,6 +1,8 @@
 // Products equal those of the plain loop bit by bit, for all sizes around those of registers.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "clients/identify/fit/products.hpp"
 #include "core/random/random.hpp"
 
@@ -16,13 +18,42 @@ TEST(Products, EqualThePlainLoop) {
     for (const Eigen::Index count : {0, 1, 5, 96}) {
       RowMajorMatrix rows = RowMajorMatrix::NullaryExpr(96, n, draw);
       Eigen::MatrixXd sums = Eigen::MatrixXd::NullaryExpr(n, n, draw), plain = sums;
-      add_products(rows, count, sums);
+      add_products(rows, count, NeededProducts(n), sums);
       for (Eigen::Index j = 0; j < n; ++j) {
         for (Eigen::Index i = j; i < n; ++i) {
           for (Eigen::Index k = 0; k < count; ++k) plain(i, j) += rows(k, i) * rows(k, j);
           ASSERT_EQ(sums(i, j), plain(i, j)) << n << " columns, " << count << " rows, at " << i << ", " << j;
         }
       }
+    }
+  }
+}
+
+TEST(Products, NeededOnesEqualThePlainLoop) {
+  std::uint32_t drawn = 0;
+  const auto draw = [&] {
+    return static_cast<double>(philox4x32({++drawn, 0, 0, 0}, {5, 6})[0]) / 4294967296.0 - 0.5;
+  };
+  for (const Eigen::Index n : {20, 64, 101, 120}) {
+    constexpr Eigen::Index kCount = 40, kFirst = 5, kLast = 2;
+    std::vector<std::vector<Eigen::Index>> groups{{9, 10, n - 3}, {}};
+    for (Eigen::Index c = 6; c < n; c += 5) groups[1].push_back(c);
+    const RowMajorMatrix rows = RowMajorMatrix::NullaryExpr(kCount, n, draw);
+    Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(n, n), plain = sums;
+    add_products(rows, kCount, NeededProducts(n, groups, kFirst, kLast), sums);
+    for (Eigen::Index j = 0; j < n; ++j)
+      for (Eigen::Index i = j; i < n; ++i)
+        for (Eigen::Index k = 0; k < kCount; ++k) plain(i, j) += rows(k, i) * rows(k, j);
+    const auto expect_equal = [&](Eigen::Index a, Eigen::Index b) {
+      const Eigen::Index i = std::max(a, b), j = std::min(a, b);
+      EXPECT_EQ(sums(i, j), plain(i, j)) << n << " columns, at " << i << ", " << j;
+    };
+    for (const std::vector<Eigen::Index>& group : groups)
+      for (const Eigen::Index a : group)
+        for (const Eigen::Index b : group) expect_equal(a, b);
+    for (Eigen::Index c = 0; c < n; ++c) {
+      for (Eigen::Index f = 0; f < kFirst; ++f) expect_equal(f, c);
+      for (Eigen::Index l = n - kLast; l < n; ++l) expect_equal(l, c);
     }
   }
 }
