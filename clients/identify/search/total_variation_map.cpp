@@ -16,7 +16,7 @@ namespace {
 
 using Shape = Factor::Shape;
 
-constexpr std::size_t kFolds = 4;
+constexpr std::size_t kMapFolds = 4;
 /// Least cross-validated gain in log likelihood.
 constexpr double kLeastMapEvidence = 15;
 
@@ -113,7 +113,7 @@ std::vector<NormalEquations> sums_of(const Fitter& fitter, const FitState& state
                                      const NodeGrid& grid) {
   const MotionModel& model = state.model;
   const auto units = state.tracks.units();
-  std::vector<NormalEquations> folds(std::min(kFolds, units.size()), NormalEquations(grid));
+  std::vector<NormalEquations> folds(std::min(kMapFolds, units.size()), NormalEquations(grid));
   os::in_parallel(folds.size(), fitter.threads(), [&](std::size_t f) {
     FineSums sums(model, map, folds[f]);
     for (std::size_t u = f; u < units.size(); u += folds.size()) {
