@@ -22,7 +22,7 @@ void take_out(Search& found, std::size_t t, FitState without) {
   found.reasons.erase(found.reasons.begin() + static_cast<std::ptrdiff_t>(t));
 }
 
-/// The models on the way of the search with fewer terms than its result, and the result.
+/// The models on the way of the search with fewer terms than its result, the result with maps in place of circles, and the result.
 std::vector<Stage> path_to(const Search& found) {
   std::vector<Stage> path;
   const std::size_t terms = found.fit.model.terms.size();
@@ -30,6 +30,7 @@ std::vector<Stage> path_to(const Search& found) {
                [&](const Stage& stage) { return stage.fit.model.terms.size() < terms; });
   if (terms == 0) path.push_back(found.path.front());
   if (terms == 0 && found.fit.model.base.command_lag_s == path.front().fit.model.base.command_lag_s) return path;
+  if (found.with_maps) path.push_back(*found.with_maps);
   path.push_back({found.fit, found.reasons});
   return path;
 }

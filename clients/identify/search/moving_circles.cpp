@@ -135,37 +135,6 @@ MovingCircle circle_of(const CirclePeak& peak, double duration_s) {
           peak.gain};
 }
 
-/// A curve over the distance from a centre, over the range that the tracks cover.
-Factor curve_about(const FitState& state, const MovingPoint& centre, std::uint32_t count) {
-  Factor curve = over(Factor::Shape::kCosines, Covariate::kPointDistance, 1e300, -1e300, count);
-  curve.axis.point = centre;
-  for (const TrackView& view : state.tracks.views()) {
-    Situation s;
-    for (const Sample& sample : view.track->samples) {
-      s.time_s = sample.time_s;
-      s.x_mm = sample.x_mm;
-      s.y_mm = sample.y_mm;
-      const double distance = value_of(curve.axis, s, 0);
-      curve.low = std::min(curve.low, distance);
-      curve.high = std::max(curve.high, distance);
-    }
-  }
-  return curve;
-}
-
-/// The derivatives of the first block's curve by the numbers of its centre.
-Block derivatives_of(const Term& term, double duration_s) {
-  const Block& block = term.blocks.front();
-  Factor shift = block.basis.factors.front();
-  shift.points.assign(shift.columns(), 0);
-  for (std::size_t i = 0; i < block.basis.size(); ++i)
-    shift.points[block.basis.chosen.empty() ? i : block.basis.chosen[i]] =
-        term.coefficients[static_cast<Eigen::Index>(i)];
-  shift.shape = Factor::Shape::kPointShift;
-  shift.count = static_cast<std::uint32_t>(std::max(1.0, std::round(duration_s)));
-  return {block.target, Basis{{shift}}, block.during};
-}
-
 void set_centre(Term& term, const MovingPoint& centre) {
   for (Block& block : term.blocks)
     for (Factor& f : block.basis.factors)
@@ -203,6 +172,37 @@ bool set_still(const Fitter& fitter, FitState& state, std::size_t place, double 
 }
 
 }  // namespace
+
+Factor curve_about(const FitState& state, const MovingPoint& centre, std::uint32_t count) {
+  Factor curve = over(Factor::Shape::kCosines, Covariate::kPointDistance, 1e300, -1e300, count);
+  curve.axis.point = centre;
+  for (const TrackView& view : state.tracks.views()) {
+    Situation s;
+    for (const Sample& sample : view.track->samples) {
+      s.time_s = sample.time_s;
+      s.x_mm = sample.x_mm;
+      s.y_mm = sample.y_mm;
+      const double distance = value_of(curve.axis, s, 0);
+      curve.low = std::min(curve.low, distance);
+      curve.high = std::max(curve.high, distance);
+    }
+  }
+  return curve;
+}
+
+Block derivatives_of(const Term& term, std::size_t of_block, double unit_s) {
+  Eigen::Index first = 0;
+  for (std::size_t b = 0; b < of_block; ++b) first += static_cast<Eigen::Index>(term.blocks[b].basis.size());
+  const Block& block = term.blocks[of_block];
+  Factor shift = block.basis.factors.front();
+  shift.points.assign(shift.columns(), 0);
+  for (std::size_t i = 0; i < block.basis.size(); ++i)
+    shift.points[block.basis.chosen.empty() ? i : block.basis.chosen[i]] =
+        term.coefficients[first + static_cast<Eigen::Index>(i)];
+  shift.shape = Factor::Shape::kPointShift;
+  shift.count = static_cast<std::uint32_t>(std::max(1.0, std::round(unit_s)));
+  return {block.target, Basis{{shift}}, block.during};
+}
 
 std::vector<MovingCircle> moving_circles_of(const Fitter& fitter, const FitState& state, const Extent& extent) {
   std::vector<MovingCircle> circles;
@@ -272,7 +272,7 @@ bool refine_moving_circle(const Fitter& fitter, FitState& state, std::size_t pla
   bool changed = false;
   double likelihood = fitter.log_likelihood(state);
   for (int pass = 0; pass < kMostPasses; ++pass) {
-    const Block slopes = derivatives_of(state.model.terms[place], duration_s);
+    const Block slopes = derivatives_of(state.model.terms[place], 0, duration_s);
     const LocalQuadratic l = local_quadratic(fitter, state, state.model.terms.size(), {slopes}, true);
     Eigen::MatrixXd information = l.information;
     information.diagonal() += l.prior;
