@@ -19,7 +19,6 @@
 #include "clients/identify/search/products.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
 #include "clients/identify/search/simplification.hpp"
-#include "clients/identify/search/standing_circles.hpp"
 #include "clients/identify/search/target_extension.hpp"
 #include "clients/identify/search/total_variation_map.hpp"
 #include "clients/identify/search/traffic_shape.hpp"
@@ -78,11 +77,7 @@ class Loop {
       note_stage();
     }
     for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t) {
-      Stage before{out_.fit, out_.reasons};
-      if (!replace_by_circles(fitter_, out_.fit, t))
-        simplify(fitter_, out_.fit, t);
-      else if (!out_.with_maps)
-        out_.with_maps = std::move(before);
+      simplify(fitter_, out_.fit, t);
       if (!is_constant_drift(out_.fit.model.terms[t])) continue;
       note_renamed(std::exchange(out_.fit.model.terms[t].name, "drift"), "drift");
       out_.reasons[t].covariates = {"world_frame"};

@@ -344,8 +344,7 @@ std::optional<FitState> with_edges(const Fitter& fitter, FitState state, std::si
   return state;
 }
 
-}  // namespace
-
+/// Returns whether circles replaced the map.
 bool replace_by_circles(const Fitter& fitter, FitState& state, std::size_t place) {
   const Term& term = state.model.terms[place];
   const std::optional<Target> target = target_of_map(term);
@@ -378,6 +377,16 @@ bool replace_by_circles(const Fitter& fitter, FitState& state, std::size_t place
   if (!best) return false;
   state = std::move(*best);
   return true;
+}
+
+}  // namespace
+
+void replace_maps_by_circles(const Fitter& fitter, Search& found) {
+  Stage before{found.fit, found.reasons};
+  bool replaced = false;
+  for (std::size_t t = 0; t < found.fit.model.terms.size(); ++t)
+    replaced = replace_by_circles(fitter, found.fit, t) || replaced;
+  if (replaced) found.with_maps = std::move(before);
 }
 
 }  // namespace kilotwin::identify

@@ -2,11 +2,12 @@
 #pragma once
 
 #include "clients/identify/fit/fitter.hpp"
+#include "clients/identify/search/search.hpp"
 
 namespace kilotwin::identify {
 
-/// Replaces a map over the position by up to three circles that stand still, each with a curve over the distance from its centre or
-/// with one step at its edge, if they explain nearly as much. Returns whether they replaced it.
-bool replace_by_circles(const Fitter&, FitState&, std::size_t term);
+/// Replaces each map over the position by up to three circles that stand still, each with a curve over the distance from its centre
+/// or with one step at its edge, where they explain nearly as much. `with_maps` of the result is then the model before.
+void replace_maps_by_circles(const Fitter&, Search&);
 
 }  // namespace kilotwin::identify
