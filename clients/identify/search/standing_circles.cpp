@@ -26,6 +26,8 @@ constexpr double kLeastShare = 0.03;
 /// Circles have far fewer numbers than the map: the loss of log likelihood that they may have, absolute and as a share of what the
 /// map explains. A map with sharp edges follows chance by some percent.
 constexpr double kLoss = 10, kLossShare = 0.05;
+/// Prior standard deviation of the coefficients before their first fit: of gains, or of rad/s.
+constexpr double kPriorSd = 0.3;
 /// Log of the number of choices for one number of a circle.
 constexpr double kPerNumber = 3;
 
@@ -57,36 +59,51 @@ std::optional<Target> target_of_map(const Term& term) {
   return target;
 }
 
-/// The map at measured positions, about its mean.
-std::vector<MapPoint> points_of(const FitState& state, const Term& term, Target target) {
+void subtract_mean(std::vector<MapPoint>& points) {
+  double sum = 0;
+  for (const MapPoint& point : points) sum += point.value;
+  for (MapPoint& point : points) point.value -= sum / static_cast<double>(points.size());
+}
+
+/// Measured positions, with value 0.
+std::vector<MapPoint> positions_of(const PreparedSet& tracks) {
   std::size_t samples = 0;
-  for (const TrackView& view : state.tracks.views()) samples += view.track->samples.size();
+  for (const TrackView& view : tracks.views()) samples += view.track->samples.size();
   const std::size_t every = samples / kMostPoints + 1;
   std::vector<MapPoint> points;
+  std::size_t next = 0;
+  for (const TrackView& view : tracks.views())
+    for (const Sample& sample : view.track->samples)
+      if (next++ % every == 0) points.push_back({sample.x_mm, sample.y_mm, 0});
+  return points;
+}
+
+/// Adds `factor` times the effect of some blocks of a term on the target there.
+void add_effect(std::vector<MapPoint>& points, const Term& term, Target target, double factor,
+                std::size_t first_block = 0, std::size_t end_block = SIZE_MAX) {
   std::array<double, kMostColumns> values;
   Situation s;
-  std::size_t next = 0;
-  double sum = 0;
-  for (const TrackView& view : state.tracks.views()) {
-    for (const Sample& sample : view.track->samples) {
-      if (next++ % every != 0) continue;
-      s.x_mm = sample.x_mm;
-      s.y_mm = sample.y_mm;
-      MapPoint& point = points.emplace_back(MapPoint{s.x_mm, s.y_mm, 0});
-      Eigen::Index first = 0;
-      for (const Block& block : term.blocks) {
-        const auto n = static_cast<Eigen::Index>(block.basis.size());
-        if (block.target == target) {
-          block.basis.evaluate(s, 0, values.data());
-          point.value += term.coefficients.segment(first, n).dot(Eigen::Map<Eigen::VectorXd>(values.data(), n));
-        }
-        first += n;
+  for (MapPoint& point : points) {
+    s.x_mm = point.x_mm;
+    s.y_mm = point.y_mm;
+    Eigen::Index first = 0;
+    for (std::size_t b = 0; b < std::min(end_block, term.blocks.size()); ++b) {
+      const Block& block = term.blocks[b];
+      const auto n = static_cast<Eigen::Index>(block.basis.size());
+      if (block.target == target && b >= first_block) {
+        block.basis.evaluate(s, 0, values.data());
+        point.value +=
+            factor * term.coefficients.segment(first, n).dot(Eigen::Map<Eigen::VectorXd>(values.data(), n));
       }
-      sum += point.value;
+      first += n;
     }
   }
-  for (MapPoint& point : points) point.value -= sum / static_cast<double>(points.size());
-  return points;
+}
+
+double sum_of_squares(const std::vector<MapPoint>& points) {
+  double sum = 0;
+  for (const MapPoint& point : points) sum += point.value * point.value;
+  return sum;
 }
 
 /// Inside less outside, and the variance that this explains, times the number of points.
@@ -141,28 +158,39 @@ Disc best_disc(const std::vector<MapPoint>& points, const Extent& e) {
   return best;
 }
 
-/// Discs one after the other, each for what the earlier ones leave.
-std::vector<Disc> discs_of(std::vector<MapPoint> points, const Extent& extent) {
-  const auto variance = [&] {
-    double sum = 0;
-    for (const MapPoint& point : points) sum += point.value * point.value;
-    return sum;
-  };
-  const double all = variance();
-  std::vector<Disc> discs;
-  while (discs.size() < kMostCircles) {
-    const Disc disc = best_disc(points, extent);
-    const Contrast contrast = contrast_of(points, disc);
-    if (!(contrast.explained > kLeastShare * all)) break;
-    discs.push_back(disc);
-    double sum = 0;
-    for (MapPoint& point : points) {
-      if (disc.holds(point)) point.value -= contrast.value;
-      sum += point.value;
+/// The disc that explains most of what the circles so far leave of the map; nothing: no large part of `all`, its sum of squares.
+std::optional<Disc> next_disc(std::vector<MapPoint> left, const Term* circles, Target target, const Extent& extent,
+                              double all) {
+  if (circles != nullptr) add_effect(left, *circles, target, -1);
+  subtract_mean(left);
+  const Disc disc = best_disc(left, extent);
+  if (!(contrast_of(left, disc).explained > kLeastShare * all)) return std::nullopt;
+  return disc;
+}
+
+/// The radius of each circle at which an edge about its centre explains most of what the other circles leave of the map.
+std::vector<double> radii_of(const std::vector<MapPoint>& map, const Term& circles, Target target,
+                             const Extent& extent) {
+  constexpr int kRadii = 200;
+  const double side = std::max(extent.x_high_mm - extent.x_low_mm, extent.y_high_mm - extent.y_low_mm);
+  std::vector<double> radii_mm;
+  for (std::size_t b = 0; b < circles.blocks.size(); ++b) {
+    std::vector<MapPoint> left = map;
+    add_effect(left, circles, target, -1, 0, b);
+    add_effect(left, circles, target, -1, b + 1);
+    subtract_mean(left);
+    const MovingPoint& centre = circles.blocks[b].basis.factors.front().axis.point;
+    double most = -1, radius_mm = 0;
+    for (int i = 1; i <= kRadii; ++i) {
+      const Disc disc{centre.x_mm, centre.y_mm, side * i / kRadii};
+      const double explained = contrast_of(left, disc).explained;
+      if (explained <= most) continue;
+      most = explained;
+      radius_mm = disc.radius_mm;
     }
-    for (MapPoint& point : points) point.value -= sum / static_cast<double>(points.size());
+    radii_mm.push_back(radius_mm);
   }
-  return discs;
+  return radii_mm;
 }
 
 Factor& curve_of(Block& block) { return block.basis.factors.front(); }
@@ -208,21 +236,6 @@ bool move_centres(const Fitter& fitter, FitState& state, std::size_t place) {
   return moved;
 }
 
-/// The term with a curve about the centre of each disc.
-FitState with_curves(const Fitter& fitter, const FitState& state, std::size_t place, Target target,
-                     const std::vector<Disc>& discs) {
-  constexpr std::uint32_t kColumns = 16;
-  std::vector<Block> blocks;
-  for (const Disc& disc : discs)
-    blocks.push_back({target, Basis{{curve_about(state, {disc.x_mm, disc.y_mm}, kColumns)}}, kDriven});
-  FitState trial = state;
-  refine_to(fitter, trial, place, blocks);
-  // Its columns are one set from here on.
-  if (move_centres(fitter, trial, place)) refine_curves(fitter, trial, place);
-  if (move_centres(fitter, trial, place)) refit(fitter, trial, place);
-  return trial;
-}
-
 /// Fits until the likelihood settles: the base speeds move far when a curve becomes a step.
 void settle(const Fitter& fitter, FitState& state) {
   constexpr int kMostFits = 6;
@@ -235,144 +248,101 @@ void settle(const Fitter& fitter, FitState& state) {
   }
 }
 
-/// Candidate radii of the blocks, columns of the quadratic approximation.
-struct EdgeRaster {
-  std::vector<std::vector<double>> at_mm;  ///< [block][candidate]
-  std::vector<Block> blocks;               ///< all candidates
-};
-
-EdgeRaster raster_about(const Term& term, const std::vector<double>& middle_mm, double half_mm) {
-  constexpr int kHalf = 12;
-  EdgeRaster out;
-  for (std::size_t b = 0; b < term.blocks.size(); ++b) {
-    Block block = term.blocks[b];
-    Factor& edge = curve_of(block);
-    edge.shape = Shape::kAtLeast;
-    edge.points.clear();
-    for (int i = -kHalf; i <= kHalf; ++i) {
-      const double at_mm = middle_mm[b] + half_mm * i / kHalf;
-      if (at_mm > edge.low && at_mm < edge.high) edge.points.push_back(at_mm);
-    }
-    block.basis.chosen.clear();
-    out.at_mm.push_back(edge.points);
-    out.blocks.push_back(block);
+/// Adds a curve about the centre of a disc to a term, and moves all centres to where they are most likely.
+void add_curve(const Fitter& fitter, FitState& state, std::size_t place, Target target, const Disc& disc) {
+  constexpr std::uint32_t kColumns = 16;
+  Term& term = state.model.terms[place];
+  term.blocks.push_back({target, Basis{{curve_about(state, {disc.x_mm, disc.y_mm}, kColumns)}}, kDriven});
+  const auto added = static_cast<Eigen::Index>(term.blocks.back().basis.size()), had = term.coefficients.size();
+  term.coefficients.conservativeResize(had + added);
+  term.precision.conservativeResize(had + added);
+  term.coefficients.tail(added).setZero();
+  term.precision.tail(added).setConstant(1 / (kPriorSd * kPriorSd));
+  for (int pass = 0; pass < 2; ++pass) {
+    refit(fitter, state, place);
+    settle(fitter, state);
+    if (!move_centres(fitter, state, place)) break;
   }
-  return out;
 }
 
-/// A radius per block, as the index of its candidate, and the prior standard deviation of the steps.
-struct Edges {
-  std::vector<std::size_t> chosen;
-  double sd = 0;
-};
-
-/// The combination of radii with the most evidence, changed one at a time.
-Edges best_edges(const ReducedColumns& data, const EdgeRaster& raster) {
-  Edges best;
-  for (const auto& at : raster.at_mm) best.chosen.push_back(at.size() / 2);
-  const auto evidence = [&](const Edges& edges) {
-    std::vector<Eigen::Index> columns;
-    Eigen::Index first = 0;
-    for (std::size_t b = 0; b < edges.chosen.size(); ++b) {
-      columns.push_back(first + static_cast<Eigen::Index>(edges.chosen[b]));
-      first += static_cast<Eigen::Index>(raster.at_mm[b].size());
-    }
-    const auto n = static_cast<Eigen::Index>(columns.size());
-    return log_evidence(data.information(columns, columns), data.score(columns),
-                        Eigen::VectorXd::Constant(n, edges.sd));
-  };
-  const double smallest = 1 / std::sqrt(std::max(data.information.diagonal().maxCoeff(), 1e-12));
-  best.sd = 30 * smallest;
-  double most = evidence(best);
-  const auto better = [&](const Edges& trial) {
-    const double value = evidence(trial);
-    if (!(value > most + 1e-9)) return false;
-    most = value;
-    best = trial;
+/// The term with one step per circle in place of its curves. The radii begin at these and move to where they are most likely.
+FitState with_edges(const Fitter& fitter, FitState state, std::size_t place, const std::vector<double>& radii_mm) {
+  constexpr double kFirstStep_mm = 12, kLastStep_mm = 0.7;
+  Term& term = state.model.terms[place];
+  const auto circles = static_cast<Eigen::Index>(term.blocks.size());
+  for (Eigen::Index b = 0; b < circles; ++b) {
+    Factor& edge = curve_of(term.blocks[static_cast<std::size_t>(b)]);
+    edge.shape = Shape::kAtLeast;
+    edge.points = {radii_mm[static_cast<std::size_t>(b)]};
+  }
+  term.coefficients = Eigen::VectorXd::Zero(circles);
+  term.precision = Eigen::VectorXd::Constant(circles, 1 / (kPriorSd * kPriorSd));
+  settle(fitter, state);
+  double likelihood = fitter.log_likelihood(state);
+  const auto moved = [&](std::size_t b, double by_mm) {
+    FitState trial = state;
+    curve_of(trial.model.terms[place].blocks[b]).points.front() += by_mm;
+    fitter.fit(trial, 2);
+    const double found = fitter.log_likelihood(trial);
+    // Negated, so that a likelihood that is no number is no progress.
+    if (!(found > likelihood)) return false;
+    likelihood = found;
+    state = std::move(trial);
     return true;
   };
-  for (bool moved = true; moved;) {
-    moved = false;
-    for (std::size_t b = 0; b < best.chosen.size(); ++b) {
-      for (std::size_t i = 0; i < raster.at_mm[b].size(); ++i) {
-        Edges trial = best;
-        trial.chosen[b] = i;
-        moved = better(trial) || moved;
-      }
-    }
-    for (double sd = smallest; sd < 10'000 * smallest; sd *= 3) {
-      Edges trial = best;
-      trial.sd = sd;
-      moved = better(trial) || moved;
-    }
-  }
-  return best;
+  for (double step_mm = kFirstStep_mm; step_mm > kLastStep_mm; step_mm /= 2)
+    for (std::size_t b = 0; b < radii_mm.size(); ++b)
+      if (!moved(b, step_mm)) moved(b, -step_mm);
+  refit(fitter, state, place);
+  return state;
 }
 
-/// The term with one step per circle; nothing if a circle has no room for one.
-std::optional<FitState> with_edges(const Fitter& fitter, FitState state, std::size_t place,
-                                   const std::vector<Disc>& discs) {
-  std::vector<double> middle_mm;
-  for (const Block& block : state.model.terms[place].blocks) {
+/// Whether the centres of all circles lie where robots were. Far from there a circle is a straight line.
+bool lies_within(const Term& term, const Extent& e) {
+  return std::all_of(term.blocks.begin(), term.blocks.end(), [&](const Block& block) {
     const MovingPoint& point = block.basis.factors.front().axis.point;
-    const auto nearest = std::min_element(discs.begin(), discs.end(), [&](const Disc& a, const Disc& b) {
-      return std::hypot(a.x_mm - point.x_mm, a.y_mm - point.y_mm) <
-             std::hypot(b.x_mm - point.x_mm, b.y_mm - point.y_mm);
-    });
-    middle_mm.push_back(nearest->radius_mm);
-  }
-  for (double half_mm = 60; half_mm > 2; half_mm /= 5) {
-    const EdgeRaster raster = raster_about(state.model.terms[place], middle_mm, half_mm);
-    if (std::any_of(raster.at_mm.begin(), raster.at_mm.end(), [](const auto& at) { return at.empty(); }))
-      return std::nullopt;
-    const LocalQuadratic l = local_quadratic(fitter, state, place, raster.blocks);
-    const Eigen::VectorXd score = l.score_without(state.model.terms[place].coefficients);
-    const Edges best = best_edges(reduced_columns(l, score, l.added_columns()), raster);
-    std::vector<Block> blocks = raster.blocks;
-    std::vector<Eigen::Index> columns;
-    Eigen::Index first = l.own;
-    for (std::size_t b = 0; b < blocks.size(); ++b) {
-      middle_mm[b] = raster.at_mm[b][best.chosen[b]];
-      curve_of(blocks[b]).points = {middle_mm[b]};
-      columns.push_back(first + static_cast<Eigen::Index>(best.chosen[b]));
-      first += static_cast<Eigen::Index>(raster.at_mm[b].size());
-    }
-    replace_blocks(state.model, place, l, blocks, score, columns,
-                   Eigen::VectorXd::Constant(static_cast<Eigen::Index>(blocks.size()), best.sd));
-    settle(fitter, state);
-  }
-  return state;
+    return point.x_mm > e.x_low_mm && point.x_mm < e.x_high_mm && point.y_mm > e.y_low_mm &&
+           point.y_mm < e.y_high_mm;
+  });
 }
 
 /// Returns whether circles replaced the map.
 bool replace_by_circles(const Fitter& fitter, FitState& state, std::size_t place) {
-  const Term& term = state.model.terms[place];
-  const std::optional<Target> target = target_of_map(term);
+  const std::optional<Target> target = target_of_map(state.model.terms[place]);
   if (!target) return false;
-  const std::vector<Disc> discs = discs_of(points_of(state, term, *target), extent_of(state.tracks));
-  if (discs.empty()) return false;
-  FitState without = state;
-  without.model.terms.erase(without.model.terms.begin() + static_cast<std::ptrdiff_t>(place));
-  fitter.fit(without, 1);
+  const Extent extent = extent_of(state.tracks);
+  std::vector<MapPoint> map = positions_of(state.tracks);
+  add_effect(map, state.model.terms[place], *target, 1);
+  subtract_mean(map);
+  const double all = sum_of_squares(map);
+  FitState circles = state;
+  const auto at = circles.model.terms.begin() + static_cast<std::ptrdiff_t>(place);
+  circles.model.terms.erase(at);
+  settle(fitter, circles);
   const double had = fitter.log_likelihood(state),
-               least = had - kLoss - kLossShare * (had - fitter.log_likelihood(without));
+               least = had - kLoss - kLossShare * (had - fitter.log_likelihood(circles));
   std::optional<FitState> best;
-  double most = 0;
-  for (std::size_t n = 1; n <= discs.size(); ++n) {
-    const std::vector<Disc> some(discs.begin(), discs.begin() + static_cast<std::ptrdiff_t>(n));
-    FitState trial = with_curves(fitter, state, place, *target, some);
+  double most = -INFINITY;
+  for (std::size_t n = 1; n <= kMostCircles; ++n) {
+    const std::optional<Disc> disc =
+        next_disc(map, n == 1 ? nullptr : &circles.model.terms[place], *target, extent, all);
+    if (!disc) break;
+    if (n == 1)
+      circles.model.terms.insert(circles.model.terms.begin() + static_cast<std::ptrdiff_t>(place),
+                                 Term{state.model.terms[place].name, {}, {}, {}});
+    add_curve(fitter, circles, place, *target, *disc);
+    if (!lies_within(circles.model.terms[place], extent)) break;
     const double numbers = kPerNumber * 3 * static_cast<double>(n);
-    double value = fitter.log_evidence(trial) - numbers;
-    if (std::optional<FitState> edges = with_edges(fitter, trial, place, some)) {
-      const double sharp = fitter.log_evidence(*edges) - numbers;
-      if (sharp > value) {
-        trial = std::move(*edges);
-        value = sharp;
-      }
-    }
-    if (!(fitter.log_likelihood(trial) > least) || (best && !(value > most))) continue;
-    most = value;
-    best = std::move(trial);
+    const auto better = [&](const FitState& trial) {
+      const double value = fitter.log_evidence(trial) - numbers;
+      // Negated, so that a likelihood that is no number is not better.
+      if (!(fitter.log_likelihood(trial) > least) || !(value > most)) return;
+      most = value;
+      best = trial;
+    };
+    better(circles);
+    const std::vector<double> radii_mm = radii_of(map, circles.model.terms[place], *target, extent);
+    better(with_edges(fitter, circles, place, radii_mm));
   }
   if (!best) return false;
   state = std::move(*best);

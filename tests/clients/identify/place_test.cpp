@@ -11,6 +11,7 @@
 #include "clients/identify/model/model_file.hpp"
 #include "clients/identify/search/neighbour_shape.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
+#include "clients/identify/search/standing_circles.hpp"
 #include "clients/identify/search/total_variation_map.hpp"
 #include "clients/identify/search/traffic_shape.hpp"
 #include "core/random/random.hpp"
@@ -165,6 +166,57 @@ TEST(Place, ASmoothMapStaysSmooth) {
   fitter.fit(state, 2);
   fit_total_variation_map(fitter, state, 0);
   EXPECT_EQ(model.terms[0].blocks.front().basis.factors.front().shape, Shape::kCosines2);
+}
+
+/// What a search that ended with a map of the floor gives.
+Search search_with_map(const Fitter& fitter, const MeasuredSet& set, std::uint32_t order) {
+  FitState state = fitted(fitter, set);
+  state.model.terms.push_back(unfitted(map_of_the_floor(order)));
+  fitter.fit(state, 2);
+  fit_total_variation_map(fitter, state, 0);
+  Search found{state, {{}}, {{state, {{}}}}, {}, {}, {}, {}};
+  return found;
+}
+
+TEST(Place, PatchesOfTheFloorBecomeCircles) {
+  constexpr double kX_mm[] = {-90, 110}, kY_mm[] = {-20, 50}, kRadius_mm[] = {70, 90}, kGain[] = {0.45, 0.7};
+  const auto distance = [&](int k, double x, double y) { return std::hypot(x - kX_mm[k], y - kY_mm[k]); };
+  const auto gain = [&](double x, double y) {
+    for (int k = 0; k < 2; ++k)
+      if (distance(k, x, y) < kRadius_mm[k]) return kGain[k];
+    return 1.0;
+  };
+  const MeasuredSet set =
+      played([&](const Around& a) { return gain(a.x_mm[a.robot], a.y_mm[a.robot]); }, 5, 12, 200);
+  const Fitter fitter(set, 2);
+  Search found = search_with_map(fitter, set, 5);
+  replace_maps_by_circles(fitter, found);
+  ASSERT_TRUE(found.with_maps);
+  EXPECT_NE(found.with_maps->fit.model.terms[0].blocks.front().basis.factors.front().axis.of,
+            Covariate::kPointDistance);
+  const std::vector<Block>& blocks = found.fit.model.terms[0].blocks;
+  ASSERT_EQ(blocks.size(), 2U);
+  for (const Block& block : blocks) {
+    const Factor& edge = block.basis.factors.front();
+    ASSERT_EQ(edge.axis.of, Covariate::kPointDistance);
+    ASSERT_EQ(edge.shape, Shape::kAtLeast);
+    const int k = edge.axis.point.x_mm < 0 ? 0 : 1;
+    EXPECT_LT(distance(k, edge.axis.point.x_mm, edge.axis.point.y_mm), 5) << k;
+    EXPECT_NEAR(edge.points.front(), kRadius_mm[k], 5) << k;
+  }
+  const double open = gain_of(found.fit.model, driven_at(0, -150));
+  for (int k = 0; k < 2; ++k)
+    EXPECT_NEAR(gain_of(found.fit.model, driven_at(kX_mm[k], kY_mm[k])) / open, kGain[k], 0.03) << k;
+}
+
+TEST(Place, ASlopeOfTheFloorIsNoCircle) {
+  const MeasuredSet set = played([](const Around& a) { return 1 + 0.002 * a.x_mm[a.robot]; }, 6, 12, 150);
+  const Fitter fitter(set, 2);
+  Search found = search_with_map(fitter, set, 3);
+  const std::string before = proto_of(found.fit.model).SerializeAsString();
+  replace_maps_by_circles(fitter, found);
+  EXPECT_FALSE(found.with_maps);
+  EXPECT_EQ(proto_of(found.fit.model).SerializeAsString(), before);
 }
 
 TEST(Place, TheNeighbourhoodRadiusIsRecovered) {
