@@ -89,6 +89,9 @@ std::string next_step(const Findings& f) {
     return f.replicates
                ? "Look for the cause of what is left unexplained, in the covariates that it varies with."
                : "Repeat the commands of one run, so that repetitions show how much can be explained at all.";
+  if (f.unexplained.perhaps)
+    return "Record more runs: the error exceeds what is expected, and too few data are held out to be sure that "
+           "it is not chance.";
   if (!f.check.dropped.empty())
     return "Record more runs: they show whether an effect that was not written held in the data of the fit only, "
            "stood for another one, or was chance.";
@@ -388,6 +391,7 @@ identification::Pattern pattern_of(const Pattern& p) {
 identification::Unexplained unexplained_of(const Unexplained& u) {
   identification::Unexplained out;
   out.set_large(u.large());
+  out.set_perhaps(u.perhaps);
   out.set_systematic_mm(u.systematic_mm);
   out.set_share(u.share);
   out.set_expected_mm(u.expected_mm);

@@ -193,9 +193,9 @@ Scene scene_of(const Arguments& arguments, const std::string& name) {
 }
 
 void print_header() {
-  fmt::print("{:20} {:>8} {:>8} {:>8} {:>6} | {:>8} {:>8} {:>8} {:>6} | {:>6} {:>5} {:>5} {:>5}  {}\n", "scene",
-             "before", "after", "oracle", "ratio", "from20s", "after", "oracle", "ratio", "named", "false", "s",
-             "cores", "found");
+  fmt::print("{:20} {:>8} {:>8} {:>8} {:>6} | {:>8} {:>8} {:>8} {:>6} | {:>6} {:>5} {:>5} {:>5} {:>7}  {}\n",
+             "scene", "before", "after", "oracle", "ratio", "from20s", "after", "oracle", "ratio", "named", "false",
+             "s", "cores", "told", "found");
 }
 
 void print_row(const Verdict& v) {
@@ -204,12 +204,15 @@ void print_row(const Verdict& v) {
     return;
   }
   fmt::print(
-      "{:20} {:8.2f} {:8.2f} {:8.2f} {:6.3f} | {:8.2f} {:8.2f} {:8.2f} {:6.3f} | {:>6} {:5} {:5.0f} {:5.2f}  "
+      "{:20} {:8.2f} {:8.2f} {:8.2f} {:6.3f} | {:8.2f} {:8.2f} {:8.2f} {:6.3f} | {:>6} {:5} {:5.0f} {:5.2f} {:>7}  "
       "{}{}{}{}\n",
       v.scene, v.before_mm, v.after_mm, v.oracle_mm, v.after_mm / v.oracle_mm, v.later_before_mm, v.later_after_mm,
       v.later_oracle_mm, v.later_after_mm / v.later_oracle_mm, fmt::format("{}/{}", v.named, v.causes),
-      v.false_findings.size(), v.seconds, v.cpu_s / v.seconds, fmt::join(v.found, ", "),
-      v.unnamed.empty() ? "" : fmt::format("; not named: {}", fmt::join(v.unnamed, ", ")),
+      v.false_findings.size(), v.seconds, v.cpu_s / v.seconds,
+      !v.unexplained.empty() ? "yes"
+      : v.perhaps            ? "perhaps"
+                             : "no",
+      fmt::join(v.found, ", "), v.unnamed.empty() ? "" : fmt::format("; not named: {}", fmt::join(v.unnamed, ", ")),
       v.missing_rows == 0 ? "" : fmt::format("; {} rows missing", v.missing_rows), v.good() ? "" : "  <-");
   std::fflush(stdout);
 }

@@ -105,6 +105,7 @@ void judge_causes(const Scene& scene, const json& result, Verdict& verdict) {
   }
   const json left = result.value("unexplained", json::object());
   if (left.value("large", false)) verdict.unexplained = left.at("in_words");
+  verdict.perhaps = left.value("perhaps", false);
   std::vector<bool> caught(scene.faults.size());
   for (const json& found : result.value("faults", json::array())) {
     bool real = false;

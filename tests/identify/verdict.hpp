@@ -23,6 +23,7 @@ struct Verdict {
   std::vector<std::string> found;           // "name [covariates]"
   double seconds = 0, cpu_s = 0;
   std::string unexplained;  // the sentence that says that a systematic error is left; empty: none is
+  bool perhaps = false;     // whether the result says that one may be left
   std::string failure;      // reason for a failure; empty if none
 
   /// Largest ratio of the error to the oracle's.

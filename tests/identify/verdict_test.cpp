@@ -111,6 +111,16 @@ TEST_F(VerdictTest, ASystematicErrorIsKeptWithItsSentence) {
   EXPECT_EQ(sentence("false"), "");
 }
 
+TEST_F(VerdictTest, APossibleErrorIsKept) {
+  const auto perhaps = [&](const char* said) {
+    return of(scenario("nothing-tidy"), 3, 3,
+              fmt::format(R"({{"effects": [], "unexplained": {{"large": false, "perhaps": {}}}}})", said))
+        .perhaps;
+  };
+  EXPECT_TRUE(perhaps("true"));
+  EXPECT_FALSE(perhaps("false"));
+}
+
 TEST_F(VerdictTest, FilesThatLackSomethingAreSaidToFail) {
   EXPECT_NE(of(scenario("fatigue"), 3, 3, "{").failure, "");
   EXPECT_NE(of(scenario("fatigue"), 3, 3, "{}").failure, "");

@@ -95,6 +95,8 @@ Data remarks_of(const Result& result) {
   add(result.command_lag().in_words());
   add(result.numbering().in_words());
   add(result.check().in_words());
+  if (result.unexplained().perhaps())
+    add("A part of the error is perhaps unexplained: too few data are held out to be sure.");
   if (const int dropped = result.check().dropped_size(); dropped > 0)
     add(fmt::format("{} not written: held-out data are predicted no better with {}.",
                     dropped == 1 ? "One effect was" : fmt::format("{} effects were", dropped),

@@ -55,19 +55,38 @@ std::string words_of(const Pattern& p) {
   return fmt::format("{} ({:.0f} %)", fmt::join(names, " with "), 100 * p.share);
 }
 
-/// How the error compares with what the model expects of itself, where no gap is beyond its uncertainty.
+/// Whether the error exceeds the model's expectation or the difference of repetitions, whatever its uncertainty.
+bool exceeds_a_floor(const Unexplained& u) {
+  return (u.expected_mm > 0 && u.error_mm > kBeyond * u.expected_mm) ||
+         (u.repetitions_mm && u.error_mm > kBeyond * *u.repetitions_mm);
+}
+
+/// How the error compares with what the model expects of itself and with repetitions, where no gap is beyond its uncertainty.
 std::string comparison_in_words(const Unexplained& u, const std::optional<ErrorBounds>& bounds) {
   if (u.error_mm == 0) return "No held-out data give an error that could be compared with what the model expects.";
-  if (!bounds)
-    return "There is one held-out track only, so that the error is not compared with what the model expects.";
-  if (u.expected_mm > 0 && u.error_mm <= kBeyond * u.expected_mm)
-    return fmt::format("The error of {:.2f} mm is near what the model expects ({:.2f} mm).", u.error_mm,
-                       u.expected_mm);
-  return fmt::format(
-      "The error of {:.2f} mm exceeds the {:.2f} mm that the model expects, but too few data are held out to be "
-      "sure: "
-      "it is {:.2f} to {:.2f} mm (95 %).",
-      u.error_mm, u.expected_mm, bounds->after.low_mm, bounds->after.high_mm);
+  const auto said = [&](const std::string& how) {
+    return fmt::format("The error of {:.2f} mm {}", u.error_mm, how);
+  };
+  if (!u.perhaps)
+    return said(u.expected_mm > 0 ? fmt::format("is near what the model expects ({:.2f} mm).", u.expected_mm)
+                                  : "is compared with no expectation of the model.");
+  const std::string exceeded =
+      u.expected_mm > 0 && u.error_mm > kBeyond * u.expected_mm
+          ? fmt::format("exceeds the {:.2f} mm that the model expects", u.expected_mm)
+          : fmt::format("exceeds the {:.2f} mm by which repetitions of the same commands differ",
+                        *u.repetitions_mm);
+  return said(exceeded + ", but too few data are held out to be sure: " +
+              (bounds
+                   ? fmt::format("it is {:.2f} to {:.2f} mm (95 %).", bounds->after.low_mm, bounds->after.high_mm)
+                   : "they are one track."));
+}
+
+std::string variation_in_words(const std::vector<Pattern>& patterns) {
+  if (patterns.empty()) return " No covariate and no pair of covariates shows a pattern of it.";
+  std::vector<std::string> shown;
+  for (std::size_t i = 0; i < std::min<std::size_t>(3, patterns.size()); ++i)
+    shown.push_back(words_of(patterns[i]));
+  return fmt::format(" It varies with {}.", fmt::join(shown, ", "));
 }
 
 /// A robot whose error is several times that of the others, in one sentence; empty: none.
@@ -95,20 +114,17 @@ std::string odd_robot_in_words(const MeasuredSet& set, const PredictionErrors& e
 
 std::string words_of(const Unexplained& u, const std::optional<ErrorBounds>& bounds, const std::string& evidence) {
   if (!u.large())
-    return comparison_in_words(u, bounds) +
+    return comparison_in_words(u, bounds) + (u.perhaps ? variation_in_words(u.patterns) : "") +
            (u.learner ? " A random forest over all covariates predicts no large part of the error."
                       : " There are too few predictions for a random forest to look for a pattern in the error.");
   const double error_mm = u.error_mm > 0 ? u.error_mm : u.learner->error_mm;
-  std::string out = fmt::format(
-      "Of the prediction error of {:.2f} mm, {:.2f} mm are systematic and unexplained ({:.0f} % of the mean square "
-      "error): "
-      "{}.",
-      error_mm, u.systematic_mm, 100 * u.share, evidence);
-  if (u.patterns.empty()) return out + " No covariate and no pair of covariates shows a pattern of it.";
-  std::vector<std::string> shown;
-  for (std::size_t i = 0; i < std::min<std::size_t>(3, u.patterns.size()); ++i)
-    shown.push_back(words_of(u.patterns[i]));
-  return out + fmt::format(" It varies with {}.", fmt::join(shown, ", "));
+  return fmt::format(
+             "Of the prediction error of {:.2f} mm, {:.2f} mm are systematic and unexplained ({:.0f} % of the mean "
+             "square "
+             "error): "
+             "{}.",
+             error_mm, u.systematic_mm, 100 * u.share, evidence) +
+         variation_in_words(u.patterns);
 }
 
 }  // namespace
@@ -132,9 +148,12 @@ Unexplained find_unexplained(const MeasuredSet& set, const std::vector<Window>& 
   u.learner = learner_check(set, known, held_out, threads, stretches);
   const Gap gap = largest_gap(u, bounds);
   u.systematic_mm = gap.systematic_mm;
+  u.perhaps = !u.large() && exceeds_a_floor(u);
   if (u.large()) {
     const double error_mm = u.error_mm > 0 ? u.error_mm : u.learner->error_mm;
     u.share = std::min(1.0, gap.systematic_mm * gap.systematic_mm / (error_mm * error_mm));
+  }
+  if (u.large() || u.perhaps) {
     // Without held-out windows: half of the tracks from the rest.
     u.patterns = held_out.empty() ? patterns_of(part_of(known, 2, 0, true), part_of(known, 2, 0, false), kShown)
                                   : patterns_of(known, held_out, kShown);

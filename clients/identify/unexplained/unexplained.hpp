@@ -22,10 +22,13 @@ struct Unexplained {
   /// The largest systematic part by these comparisons, beyond their uncertainty; 0: none.
   double systematic_mm = 0;
   double share = 0;               ///< of the mean square error
-  std::vector<Pattern> patterns;  ///< what it looks like; empty if nothing large is left
+  std::vector<Pattern> patterns;  ///< what it looks like; empty unless something large is left, perhaps
   std::string in_words;
 
+  /// Beyond its uncertainty.
   [[nodiscard]] bool large() const { return systematic_mm > 0; }
+  /// The error exceeds the model's expectation or the difference of repetitions, but too few data are held out to be sure.
+  bool perhaps = false;
 };
 
 /// `known` and `held_out`: windows of the fit and of held-out data (may be empty); `errors` and `bounds`: of the model on
