@@ -32,7 +32,7 @@ struct IdentifyArguments {
   fs::path train, test;
   Output output;
   std::string columns, angle = "rad", frame = "plane";
-  std::optional<double> unit_mm;
+  std::optional<double> unit_mm, unit_s;
   DesignArguments design;
   double horizon_s = 10;
   std::uint32_t threads = 2, draws = 0;
@@ -115,7 +115,8 @@ void write_candidates(std::vector<std::pair<std::string, proto::Model>> candidat
 
 /// Whether options state the format of tables.
 bool states_format(const IdentifyArguments& arguments) {
-  return !arguments.columns.empty() || arguments.unit_mm || arguments.angle != "rad" || arguments.frame != "plane";
+  return !arguments.columns.empty() || arguments.unit_mm || arguments.unit_s || arguments.angle != "rad" ||
+         arguments.frame != "plane";
 }
 
 /// The kind of the data; both directories must hold the same. Throws UserError.
@@ -156,6 +157,7 @@ fs::path converted(const IdentifyArguments& arguments, const fs::path& data, con
                     "--columns heading=NAME",
                     data.string()));
   format.unit_mm = arguments.unit_mm.value_or(1);
+  format.unit_s = arguments.unit_s.value_or(1);
   format.degrees = arguments.angle == "deg";
   format.image = arguments.frame == "image";
   identify::import_tables(data, to, format);
@@ -207,7 +209,8 @@ constexpr std::array kDesignOptions = {"--candidate", "--duration", "--robots", 
                                        "--every",     "--seed",     "--no-headings"};
 
 /// Options of data, which a plan refuses.
-constexpr std::array kDataOptions = {"--horizon", "--draws", "--columns", "--unit-mm", "--angle", "--frame"};
+constexpr std::array kDataOptions = {"--horizon", "--draws", "--columns", "--unit-mm",
+                                     "--unit-s",  "--angle", "--frame"};
 
 void add_design_options(CLI::App& app, DesignArguments& design) {
   app.add_option(
@@ -269,6 +272,10 @@ Command add_identify(CLI::App& program) {
   app.add_option("--unit-mm", arguments->unit_mm, "length of a unit of x and y, mm: 1000 for metres (default: 1)")
       ->check(CLI::Range(1e-6, 1e6).description(""))
       ->type_name("MM");
+  app.add_option("--unit-s", arguments->unit_s,
+                 "duration of a unit of time, s: 0.001 for milliseconds, 0.04 for frames at 25 Hz (default: 1)")
+      ->check(CLI::Range(1e-9, 1e6).description(""))
+      ->type_name("S");
   app.add_option("--angle", arguments->angle, "unit of the headings: rad or deg")
       ->check(CLI::IsMember({"rad", "deg"}).description(""))
       ->capture_default_str()

@@ -166,10 +166,10 @@ void demand_motion(const MeasuredSet& set, const std::string& from) {
         "length of a unit: --unit-mm MM; time_s in seconds",
         from, speed));
   if (speed < kSlowestMedian_mm_s)
-    throw UserError(
-        fmt::format("{}: commanded robots drive at {:.3g} mm/s, Kilobots at about 10 mm/s; give x_mm and y_mm "
-                    "in mm (not metres), or --unit-mm 1000; time_s in seconds (not milliseconds)",
-                    from, speed));
+    throw UserError(fmt::format(
+        "{}: commanded robots drive at {:.3g} mm/s, Kilobots at about 10 mm/s; give x_mm and y_mm "
+        "in mm (not metres), or --unit-mm 1000; time_s in seconds (not milliseconds), or --unit-s 0.001",
+        from, speed));
 }
 
 /// In a picture y points down, and turns then have the wrong sign. Robots that turn against their commands show it.

@@ -57,8 +57,8 @@ std::string rows_of_table(const fs::path& file, const TableFormat& format) {
   while (csv.next()) {
     const double x_units = csv.number_or_nan(x), y_units = csv.number_or_nan(y);
     if (std::isnan(x_units) || std::isnan(y_units)) continue;  // the tracker lost the robot
-    rows += row_of(run ? csv_cell(std::string(csv.text(*run))) : of_file, csv.whole(robot), csv.number(time),
-                   format.unit_mm * x_units, up * format.unit_mm * y_units,
+    rows += row_of(run ? csv_cell(std::string(csv.text(*run))) : of_file, csv.whole(robot),
+                   format.unit_s * csv.number(time), format.unit_mm * x_units, up * format.unit_mm * y_units,
                    heading ? angle * csv.number_or_nan(*heading) : std::numeric_limits<double>::quiet_NaN());
   }
   return rows;

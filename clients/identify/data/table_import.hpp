@@ -12,6 +12,7 @@ struct TableFormat {
   std::string heading;   ///< empty: none is read
   std::string run;       ///< empty: a run per file, named after it
   double unit_mm = 1;    ///< length of one unit of x and y
+  double unit_s = 1;     ///< duration of one unit of time
   bool degrees = false;  ///< headings; else rad
   bool image = false;    ///< y points down and headings count clockwise, as in pictures
 };

@@ -77,11 +77,12 @@ TEST_F(ImportTest, NamesOfColumnsAndACutLastLine) {
 }
 
 TEST_F(ImportTest, TablesOfAnyTrackerByNamesUnitsAndAxes) {
-  give("trial.csv", "ID,t,px,py,theta\n7,0.5,0.1,-0.2,90\n7,1,,,\n8,0.5,0.3,0.4,-45\n");
+  give("trial.csv", "ID,t,px,py,theta\n7,500,0.1,-0.2,90\n7,1000,,,\n8,500,0.3,0.4,-45\n");
   give("commands.csv", "run,robot,time_s,motion\ntrial,7,0,left\n");
   TableFormat format;
   set_columns(format, "time=t,robot=ID,x=px,y=py,heading=theta");
   format.unit_mm = 1000;
+  format.unit_s = 0.001;
   format.degrees = format.image = true;
   import_tables(folder_ / "from", folder_ / "to", format);
   const MeasuredSet set = load_measured_set(folder_ / "to");
