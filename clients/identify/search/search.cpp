@@ -43,7 +43,6 @@ constexpr double kMostByShape = 200, kAsGood = 10;
 /// Hypotheses with this share of the best evidence are kept as alternatives: the order may change after shape
 /// refinement.
 constexpr double kAlternativeShare = 0.97;
-constexpr const char* kCameraForDrift = "camera-by-time for drift-by-time";
 /// No form is exact. A hypothesis that explains less than this share of the total gain counts as a remnant.
 constexpr double kRemnant = 0.003;
 /// Largest number of samples in the test. More add cost and no power that is needed.
@@ -52,12 +51,21 @@ constexpr std::size_t kEnoughSamples = 130000;
 constexpr std::size_t kEnoughForGeneral = 70000;
 /// General terms that are tried in one round.
 constexpr std::size_t kMostTries = 4;
-/// Key of a general term among the failed hypotheses.
-constexpr const char* kGeneral = "general ";
-/// The same of a wave or a moving circle, which may have the name of a general term.
-constexpr const char* kForm = "form ";
-/// The same of a wave among named hypotheses.
-constexpr const char* kWave = "wave";
+/// What a search tries. An attempt that failed is not repeated.
+struct Attempt {
+  enum class Kind : std::uint8_t {
+    kNamed,       ///< a hypothesis with a named form
+    kForm,        ///< a wave or a moving circle, which may have the name of a general term
+    kGeneral,     ///< a general term
+    kWave,        ///< a wave among named hypotheses
+    kLoneCircle,  ///< a moving circle in place of terms, if it leaves no hypothesis
+    kCircle,      ///< a moving circle in place of terms
+    kExchange     ///< the first hypothesis in place of a term, the second
+  };
+  Kind kind;
+  std::vector<std::string> names;
+  auto operator<=>(const Attempt&) const = default;
+};
 
 class Loop {
  public:
@@ -138,7 +146,7 @@ class Loop {
     // Negated, so that a likelihood that is no number fails.
     if (!(fitter_.log_likelihood_of_all(out_.fit) >= likelihood + kLeastRise)) {
       out_ = before;
-      failed_.insert(name);
+      failed_.insert({Attempt::Kind::kNamed, {name}});
       return false;
     }
     eliminate_earlier();
@@ -186,7 +194,7 @@ class Loop {
     const Finding* best = nullptr;
     for (const Finding& f : outcome.findings) {
       if (!good(f, outcome.threshold_log10_p) || f.evidence < least_evidence ||
-          failed_.contains(hypothesis(f).name))
+          failed_.contains({Attempt::Kind::kNamed, {hypothesis(f).name}}))
         continue;
       if (of_robots_and_more(hypothesis(f)) && parts_evidence(hypothesis(f), outcome) > f.evidence) continue;
       if (best == nullptr || f.evidence > best->evidence) best = &f;
@@ -207,7 +215,7 @@ class Loop {
       for (const Finding& f : outcome.findings) {
         const Hypothesis& h = hypothesis(f);
         if (h.acts_on != pair.acts_on || h.covariates != std::vector<std::string>{part}) continue;
-        any = any || (good(f, outcome.threshold_log10_p) && !failed_.contains(h.name));
+        any = any || (good(f, outcome.threshold_log10_p) && !failed_.contains({Attempt::Kind::kNamed, {h.name}}));
         most = std::max({most, f.evidence, (f.statistic - f.degrees) / 2});
       }
       sum += most;
@@ -227,9 +235,9 @@ class Loop {
     Term term;
     Reason reason;
   };
+  using Candidates = std::map<Attempt, GeneralTerm>;
   /// Adds the hypotheses of a family that pass the tests, of each name the one with the most evidence, by kind and name.
-  void add_candidates(const Dictionary& family, bool general, double least_evidence,
-                      std::map<std::string, GeneralTerm>& best) {
+  void add_candidates(const Dictionary& family, bool general, double least_evidence, Candidates& best) {
     std::vector<Block> blocks = blocks_of(out_.fit.model);
     blocks.insert(blocks.end(), family.blocks.begin(), family.blocks.end());
     const ColumnGroups read = columns_read_by_test(out_.fit.model, family);
@@ -239,14 +247,14 @@ class Loop {
     const ScoreTest::Outcome outcome = test.test(kSeed + 100 + static_cast<std::uint64_t>(round_));
     for (const Finding& f : outcome.findings) {
       const Hypothesis& h = family.hypotheses[f.hypothesis];
-      const auto known = best.find((general ? kGeneral : kForm) + h.name);
-      if (!good(f, outcome.threshold_log10_p) || f.evidence < least_evidence ||
-          failed_.contains((general ? kGeneral : kForm) + h.name) ||
+      const Attempt attempt{general ? Attempt::Kind::kGeneral : Attempt::Kind::kForm, {h.name}};
+      const auto known = best.find(attempt);
+      if (!good(f, outcome.threshold_log10_p) || f.evidence < least_evidence || failed_.contains(attempt) ||
           (known != best.end() && f.evidence <= known->second.reason.finding.evidence))
         continue;
       GeneralTerm one{family.term_of(h, f.relative_scale), {h.covariates, h.acts_on, f, outcome.threshold_log10_p}};
       one.term.general = general;
-      best.insert_or_assign((general ? kGeneral : kForm) + h.name, std::move(one));
+      best.insert_or_assign(attempt, std::move(one));
     }
   }
   /// Those of all families, in the order of their evidence.
@@ -257,7 +265,7 @@ class Loop {
       families.push_back(std::move(waves));
     const std::vector<MovingCircle> circles = moving_circles_of(fitter_, out_.fit, extent_);
     if (!circles.empty()) families.push_back(dictionary_of_circles(out_.fit, extent_, circles));
-    std::map<std::string, GeneralTerm> best;
+    Candidates best;
     const double least = kRemnant * explained();
     for (const Dictionary& family : families) {
       // Waves and moving circles have a form of their own, with a name.
@@ -265,16 +273,16 @@ class Loop {
       add_candidates(family, general, least, best);
     }
     std::vector<GeneralTerm> ranked;
-    for (auto& [name, one] : best) ranked.push_back(std::move(one));
+    for (auto& [attempt, one] : best) ranked.push_back(std::move(one));
     std::stable_sort(ranked.begin(), ranked.end(), [](const GeneralTerm& a, const GeneralTerm& b) {
       return a.reason.finding.evidence > b.reason.finding.evidence;
     });
     if (ranked.size() > kMostTries) ranked.resize(kMostTries);
     return ranked;
   }
-  /// Adds a term. Returns false, with the state as before, if the likelihood does not rise. `key`: among the failed
-  /// hypotheses.
-  bool fits(GeneralTerm one, const std::string& key) {
+  /// Adds a term. Returns false, with the state as before, if the likelihood does not rise. `attempt`: noted as
+  /// failed.
+  bool fits(GeneralTerm one, const Attempt& attempt) {
     constexpr double kLeastRise = 3;
     const Search before = out_;
     const double likelihood = fitter_.log_likelihood_of_all(out_.fit);
@@ -286,17 +294,18 @@ class Loop {
     fitter_.fit_contacts(out_.fit);
     if (fitter_.log_likelihood_of_all(out_.fit) >= likelihood + kLeastRise) return true;
     out_ = before;
-    failed_.insert(key);
+    failed_.insert(attempt);
     return false;
   }
   /// A travelling wave with more evidence than the best hypothesis, which may be a proxy of it: adds the wave. A wave that
   /// repeats neither within a run nor on the floor is left to the other hypotheses: it may be a proxy itself.
   bool accept_wave(double evidence) {
     constexpr double kFewestPeriods = 1.5, kFewestStripes = 4;
-    if (failed_.contains(kWave)) return false;
+    const Attempt attempt{Attempt::Kind::kWave, {}};
+    if (failed_.contains(attempt)) return false;
     const Dictionary waves = wave_dictionary_of(fitter_, out_.fit, extent_);
     if (waves.hypotheses.empty()) return false;
-    std::map<std::string, GeneralTerm> best;
+    Candidates best;
     add_candidates(waves, false, evidence, best);
     if (best.empty()) return false;
     GeneralTerm& wave = best.begin()->second;
@@ -307,7 +316,7 @@ class Loop {
                            (2 * M_PI);
     if (periods < kFewestPeriods && stripes < kFewestStripes) return false;
     say(kAddition, "fitting " + wave.term.name);
-    return fits(std::move(wave), kWave);
+    return fits(std::move(wave), attempt);
   }
   /// Whether a term is an effect of position or time on the speed, and no moving circle itself.
   [[nodiscard]] bool may_be_part_of_circle(std::size_t t) const {
@@ -338,11 +347,10 @@ class Loop {
     // One amplitude within a circle explains less than its curve: the share of what the other terms explain that is worth a fit.
     // A product that comes later may explain what the circle leaves, unless it leaves nothing.
     const double least_share = alone ? 0.2 : 0.5;
-    const std::string start = alone ? "lone circle for" : "circle for";
-    std::string key = start;
+    Attempt attempt{alone ? Attempt::Kind::kLoneCircle : Attempt::Kind::kCircle, {}};
     for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t)
-      if (may_be_part_of_circle(t)) key += " " + out_.fit.model.terms[t].name;
-    if (key == start || worked_out() || !failed_.insert(key).second) return false;
+      if (may_be_part_of_circle(t)) attempt.names.push_back(out_.fit.model.terms[t].name);
+    if (attempt.names.empty() || worked_out() || !failed_.insert(attempt).second) return false;
     say(kAlternatives, "testing moving circles");
     const Search before = out_;
     const double evidence = fitter_.log_evidence(out_.fit), likelihood = fitter_.log_likelihood_of_all(out_.fit);
@@ -355,9 +363,9 @@ class Loop {
     const double explained = likelihood - fitter_.log_likelihood_of_all(out_.fit);
     const std::vector<MovingCircle> circles = moving_circles_of(fitter_, out_.fit, extent_);
     if (!circles.empty() && circles.front().gain > least_share * explained) {
-      std::map<std::string, GeneralTerm> best;
+      Candidates best;
       add_candidates(dictionary_of_circles(out_.fit, extent_, circles), false, least_share * explained, best);
-      if (!best.empty() && fits(std::move(best.begin()->second), key) &&
+      if (!best.empty() && fits(std::move(best.begin()->second), attempt) &&
           fitter_.log_evidence(out_.fit) > evidence + kClose && !(alone && leaves_hypothesis()))
         return true;
     }
@@ -368,14 +376,14 @@ class Loop {
   bool accept_further_circle() {
     // Chance finds circles with a smaller gain in most sets.
     constexpr double kLeastGain = 30;
-    const std::string key = std::string(kForm) + "speed-by-position-and-time";
-    if (!limit().empty() || failed_.contains(key)) return false;
+    const Attempt attempt{Attempt::Kind::kForm, {"speed-by-position-and-time"}};
+    if (!limit().empty() || failed_.contains(attempt)) return false;
     say(kAlternatives, "testing moving circles");
     const std::vector<MovingCircle> circles = moving_circles_of(fitter_, out_.fit, extent_);
     if (circles.empty() || circles.front().gain < kLeastGain) return false;
-    std::map<std::string, GeneralTerm> best;
+    Candidates best;
     add_candidates(dictionary_of_circles(out_.fit, extent_, circles), false, kRemnant * explained(), best);
-    return !best.empty() && fits(std::move(best.begin()->second), key);
+    return !best.empty() && fits(std::move(best.begin()->second), attempt);
   }
   /// Adds the general term with the most evidence that fits, if much is left unexplained. Returns whether there is one.
   bool accept_general() {
@@ -384,8 +392,8 @@ class Loop {
     if (!leaves_much_(out_.fit)) return false;
     for (GeneralTerm& one : general_candidates()) {
       if (worked_out()) break;
-      const std::string key = (one.term.general ? kGeneral : kForm) + one.term.name;
-      if (!fits(std::move(one), key)) continue;
+      const Attempt attempt{one.term.general ? Attempt::Kind::kGeneral : Attempt::Kind::kForm, {one.term.name}};
+      if (!fits(std::move(one), attempt)) continue;
       ++general_terms_;
       --eliminations_;
       return true;
@@ -540,9 +548,10 @@ class Loop {
   void try_camera_motion() {
     const auto drift = std::find_if(out_.fit.model.terms.begin(), out_.fit.model.terms.end(),
                                     [](const Term& term) { return term.name == "drift-by-time"; });
-    if (drift == out_.fit.model.terms.end() || failed_.contains(kCameraForDrift)) return;
     // Once only: otherwise the search could alternate between both.
-    failed_.insert(kCameraForDrift);
+    if (drift == out_.fit.model.terms.end() ||
+        !failed_.insert({Attempt::Kind::kExchange, {"camera-by-time", "drift-by-time"}}).second)
+      return;
     const auto place = static_cast<std::size_t>(drift - out_.fit.model.terms.begin());
     const bool at_rest = std::any_of(drift->blocks.begin(), drift->blocks.end(),
                                      [](const Block& block) { return (block.during & ~kDriven) != 0; });
@@ -587,7 +596,7 @@ class Loop {
       }
       if (best == nullptr || best->name == out_.fit.model.terms[place].name ||
           best_finding.evidence <= own.evidence + std::max(kClose, kRemnant * own.evidence) ||
-          failed_.contains(best->name + " for " + out_.fit.model.terms[place].name))
+          failed_.contains({Attempt::Kind::kExchange, {best->name, out_.fit.model.terms[place].name}}))
         continue;
       if (exchanged_for(place, *best, best_finding)) return true;
     }
@@ -619,7 +628,7 @@ class Loop {
       }
     }
     out_ = before;
-    failed_.insert(other.name + " for " + out_.fit.model.terms[place].name);
+    failed_.insert({Attempt::Kind::kExchange, {other.name, out_.fit.model.terms[place].name}});
     return false;
   }
   /// Whether a term is the constant part of another one.
@@ -735,7 +744,7 @@ class Loop {
     std::map<std::string, std::pair<Term, Reason>> by_name;  ///< by name
   };
   Alternatives alternatives_;
-  std::set<std::string> failed_;  ///< hypotheses that failed after the refit
+  std::set<Attempt> failed_;
   int eliminations_ = 0, round_ = 0, failures_ = 0;
   bool starts_anew_ = false;  ///< with a lag
 };

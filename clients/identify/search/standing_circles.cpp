@@ -265,9 +265,31 @@ void add_curve(const Fitter& fitter, FitState& state, std::size_t place, Target 
   }
 }
 
-/// The term with one step per circle in place of its curves. The radii begin at these and move to where they are most likely.
+/// Moves numbers of the circles by steps as long as the likelihood rises. `first_mm`: the first step, which is halved down to 0.7 mm.
+void climb(const Fitter& fitter, FitState& state, std::size_t place, double first_mm,
+           const std::vector<double& (*)(Factor&)>& numbers) {
+  constexpr double kLast_mm = 0.7;
+  double likelihood = fitter.log_likelihood(state);
+  const auto moved = [&](std::size_t b, double& (*number)(Factor&), double by_mm) {
+    FitState trial = state;
+    number(curve_of(trial.model.terms[place].blocks[b])) += by_mm;
+    fitter.fit(trial, 2);
+    const double found = fitter.log_likelihood(trial);
+    // Negated, so that a likelihood that is no number is no progress.
+    if (!(found > likelihood)) return false;
+    likelihood = found;
+    state = std::move(trial);
+    return true;
+  };
+  const std::size_t circles = state.model.terms[place].blocks.size();
+  for (double step_mm = first_mm; step_mm > kLast_mm; step_mm /= 2)
+    for (std::size_t b = 0; b < circles; ++b)
+      for (const auto number : numbers)
+        if (!moved(b, number, step_mm)) moved(b, number, -step_mm);
+}
+
+/// The term with one step per circle in place of its curves. The radii begin at these.
 FitState with_edges(const Fitter& fitter, FitState state, std::size_t place, const std::vector<double>& radii_mm) {
-  constexpr double kFirstStep_mm = 12, kLastStep_mm = 0.7;
   Term& term = state.model.terms[place];
   const auto circles = static_cast<Eigen::Index>(term.blocks.size());
   for (Eigen::Index b = 0; b < circles; ++b) {
@@ -278,21 +300,11 @@ FitState with_edges(const Fitter& fitter, FitState state, std::size_t place, con
   term.coefficients = Eigen::VectorXd::Zero(circles);
   term.precision = Eigen::VectorXd::Constant(circles, 1 / (kPriorSd * kPriorSd));
   settle(fitter, state);
-  double likelihood = fitter.log_likelihood(state);
-  const auto moved = [&](std::size_t b, double by_mm) {
-    FitState trial = state;
-    curve_of(trial.model.terms[place].blocks[b]).points.front() += by_mm;
-    fitter.fit(trial, 2);
-    const double found = fitter.log_likelihood(trial);
-    // Negated, so that a likelihood that is no number is no progress.
-    if (!(found > likelihood)) return false;
-    likelihood = found;
-    state = std::move(trial);
-    return true;
-  };
-  for (double step_mm = kFirstStep_mm; step_mm > kLastStep_mm; step_mm /= 2)
-    for (std::size_t b = 0; b < radii_mm.size(); ++b)
-      if (!moved(b, step_mm)) moved(b, -step_mm);
+  const auto radius = [](Factor& edge) -> double& { return edge.points.front(); };
+  const auto x = [](Factor& edge) -> double& { return edge.axis.point.x_mm; };
+  const auto y = [](Factor& edge) -> double& { return edge.axis.point.y_mm; };
+  climb(fitter, state, place, 12, {radius});
+  climb(fitter, state, place, 2, {x, y, radius});
   refit(fitter, state, place);
   return state;
 }

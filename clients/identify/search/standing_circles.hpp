@@ -6,8 +6,8 @@
 
 namespace kilotwin::identify {
 
-/// Replaces each map over the position by up to three circles that stand still, each with a curve over the distance from its centre
-/// or with one step at its edge, where they explain nearly as much. `with_maps` of the result is then the model before.
+/// Replaces each map over the position by up to three circles that stand still, where they explain nearly as much. Each circle has
+/// a curve over the distance from its centre, or one step at its edge. `with_maps` of the result is then the model before.
 void replace_maps_by_circles(const Fitter&, Search&);
 
 }  // namespace kilotwin::identify

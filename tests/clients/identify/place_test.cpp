@@ -168,7 +168,7 @@ TEST(Place, ASmoothMapStaysSmooth) {
   EXPECT_EQ(model.terms[0].blocks.front().basis.factors.front().shape, Shape::kCosines2);
 }
 
-/// What a search that ended with a map of the floor gives.
+/// A search that ended with a map of the floor.
 Search search_with_map(const Fitter& fitter, const MeasuredSet& set, std::uint32_t order) {
   FitState state = fitted(fitter, set);
   state.model.terms.push_back(unfitted(map_of_the_floor(order)));
