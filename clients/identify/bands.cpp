@@ -202,6 +202,18 @@ std::vector<Group> groups_of(const Term& term) {
   return groups;
 }
 
+/// What may be drawn as one curve: the groups, then each of their blocks alone, as with curves over several covariates.
+std::vector<Group> drawn_groups_of(const Term& term) {
+  std::vector<Group> groups = groups_of(term);
+  const std::size_t wholes = groups.size();
+  for (std::size_t g = 0; g < wholes; ++g) {
+    if (groups[g].size() < 2) continue;
+    const Group whole = groups[g];
+    for (const std::size_t b : whole) groups.push_back({b});
+  }
+  return groups;
+}
+
 double factor_of(const std::string& unit) { return unit == "%" ? 100 : unit == "degrees" ? 180 / M_PI : 1; }
 
 /// Drawn values, and where the blocks of a group have them.
@@ -273,7 +285,7 @@ void set_band(identification::EffectCurve& curve, const MotionModel& model, std:
               const Uncertainty& uncertainty, const std::vector<StepInterval>& steps) {
   const Term& term = model.terms[t];
   const TermBand band(model, t, uncertainty, steps);
-  for (const Group& group : groups_of(term)) {
+  for (const Group& group : drawn_groups_of(term)) {
     if (term.blocks[group.front()].basis.factors.empty()) continue;
     const Axis axis = term.blocks[group.front()].basis.factors.back().axis;
     Drawn drawn{{curve.value().begin(), curve.value().end()}, {}, factor_of(curve.acts_on_unit())};

@@ -309,15 +309,20 @@ identification::DiscCentre disc_centre_of(const MotionModel& model, const Geomet
       tracked ? "at the tracked point"
               : fmt::format("{:.1f} mm ahead of the drive's reference point", model.base.centre_mm);
   const double evidence = model.centre_evidence;
-  const std::string why = evidence == 0 ? "assumed: not identifiable from these data"
-                          : evidence > kTold
+  const bool bounded = intervals.centre_low_mm && intervals.centre_high_mm;
+  const std::string why = evidence > kTold
                               ? fmt::format("determined by contacts, with {:.0f} nat of log likelihood", evidence)
-                              : std::string("determined by how near robots come to each other");
+                          : bounded       ? std::string("determined by contacts")
+                          : evidence == 0 ? std::string("assumed: not identifiable from these data")
+                                          : std::string("determined by how near robots come to each other");
   identification::DiscCentre out;
   out.set_ahead_mm(model.base.centre_mm);
   out.set_at_tracked_point(tracked);
   out.set_log_likelihood_over_alternative(evidence);
-  out.set_in_words(fmt::format("Contacts and walls act {} ({}).", where, why));
+  const std::string interval = bounded ? fmt::format("; 95 % interval {:.1f} to {:.1f} mm",
+                                                     *intervals.centre_low_mm, *intervals.centre_high_mm)
+                                       : "";
+  out.set_in_words(fmt::format("Contacts and walls act {} ({}{}).", where, why, interval));
   if (intervals.centre_low_mm) out.set_low_mm(*intervals.centre_low_mm);
   if (intervals.centre_high_mm) out.set_high_mm(*intervals.centre_high_mm);
   return out;

@@ -65,12 +65,13 @@ Estimate estimate_of(const StepInterval& step) {
 }  // namespace
 
 std::vector<Estimate> estimates_of(std::size_t term, const Uncertainty& u, const std::vector<StepInterval>& steps) {
-  std::vector<Estimate> out;
+  std::vector<Estimate> out, amplitudes;
   const Eigen::Index first = u.all.rows() - u.held.size();
   for (Eigen::Index i = 0; i < u.held.size(); ++i) {
     const HeldNumber& number = u.held.numbers[static_cast<std::size_t>(i)];
     if (number.term != term || number.name.empty()) continue;
-    out.push_back(with_sd(number.name, number.unit, number.value, u.sd(first + i)));
+    const bool amplitude = number.name.starts_with(kAmplitude);
+    (amplitude ? amplitudes : out).push_back(with_sd(number.name, number.unit, number.value, u.sd(first + i)));
     const auto next = static_cast<std::size_t>(i) + 1;
     if (number.name == "wave number y")
       add_wave(out, u, i - 1, next < u.held.numbers.size() && u.held.numbers[next].name == "angular frequency");
@@ -81,6 +82,7 @@ std::vector<Estimate> estimates_of(std::size_t term, const Uncertainty& u, const
   std::stable_sort(own.begin(), own.end(),
                    [](const StepInterval& a, const StepInterval& b) { return a.at < b.at; });
   for (const StepInterval& step : own) out.push_back(estimate_of(step));
+  out.insert(out.end(), amplitudes.begin(), amplitudes.end());
   return out;
 }
 

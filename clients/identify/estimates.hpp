@@ -9,7 +9,7 @@
 
 namespace kilotwin::identify {
 
-/// Of one term, in the order of its factors; steps last, in ascending order.
+/// Of one term, in the order of its factors; then its steps in ascending order; then the amplitudes of known tables.
 [[nodiscard]] std::vector<identification::Estimate> estimates_of(std::size_t term, const Uncertainty&,
                                                                  const std::vector<StepInterval>&);
 

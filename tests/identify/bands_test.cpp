@@ -8,6 +8,7 @@
 
 #include "clients/identify/estimates.hpp"
 #include "clients/identify/fit/term_values.hpp"
+#include "core/stats/distributions.hpp"
 #include "tests/identify/small_set.hpp"
 #include "tests/identify/truth/effects.hpp"
 
@@ -69,7 +70,8 @@ TEST(Bands, OfALinearTermIsTheClosedForm) {
   for (int i = 0; i < 21; ++i) {
     const double share = list(bands, 0, "at").values(i).number_value() / 8;
     EXPECT_NEAR(list(bands, 0, "value").values(i).number_value(), -0.2 * share, 1e-12);
-    EXPECT_NEAR(list(bands, 0, "high").values(i).number_value(), -0.2 * share + 1.959964 * kSd * share, 1e-6);
+    EXPECT_NEAR(list(bands, 0, "high").values(i).number_value(), -0.2 * share + stats::kNormal95 * kSd * share,
+                1e-12);
   }
 }
 

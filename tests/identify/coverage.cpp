@@ -11,6 +11,7 @@
 #include "core/stats/distributions.hpp"
 #include "core/stats/moments.hpp"
 #include "tests/identify/truth/dice.hpp"
+#include "tests/identify/truth/world.hpp"
 #include "tests/identify/verdict.hpp"
 
 namespace kilotwin::truth {
@@ -186,7 +187,7 @@ void Coverage::add_walls(const Scene& scene, const json& result) {
   for (const char* side : {"x_low_mm", "x_high_mm", "y_low_mm", "y_high_mm"}) {
     const json &low = result["walls_low"], &high = result["walls_high"];
     if (!low.contains(side) || !high.contains(side) || low[side].is_null() || high[side].is_null()) continue;
-    const double half_mm = (side[0] == 'x' ? scene.width_mm : scene.height_mm) / 2;
+    const double half_mm = (side[0] == 'x' ? scene.width_mm : scene.height_mm) / 2 - kDiscRadius_mm;
     add_interval(scene.name, "wall_mm", side[2] == 'l' ? -half_mm : half_mm, low[side], high[side]);
   }
 }

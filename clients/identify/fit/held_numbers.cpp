@@ -212,7 +212,14 @@ class Collector {
       prior = prior_of(f);
     }
     priors_.emplace_back(to_.size(), prior);
-    for (Eigen::Index i = 0; i < prior.rows(); ++i) to_.numbers.push_back({t, ""});
+    for (Eigen::Index i = 0; i < prior.rows(); ++i) {
+      HeldNumber& number = to_.numbers.emplace_back(HeldNumber{t, ""});
+      if (f.shape != Shape::kTable) continue;
+      const auto key = static_cast<std::size_t>(i);
+      number.name =
+          std::string(kAmplitude) + name_of(f.axis.of) + " " + std::to_string(static_cast<int>(f.points[key]));
+      number.value = f.plus + f.known[key];
+    }
   }
   void add_nodes(const OwnBlock& one, std::size_t f, Eigen::Index first) {
     for (std::uint32_t node = 0; node < kDeviationNodes * kDeviationNodes; ++node) {

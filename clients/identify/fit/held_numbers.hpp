@@ -30,6 +30,9 @@ struct ColumnSums {
   std::vector<Part> parts_;  ///< by block
 };
 
+/// Start of the name of an amplitude: "amplitude, robot 3".
+inline constexpr const char* kAmplitude = "amplitude, ";
+
 struct HeldNumber {
   std::size_t term = 0;
   std::string name;  ///< of numbers that are reported; empty: a coefficient or a node

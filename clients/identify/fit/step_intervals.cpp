@@ -48,59 +48,84 @@ std::vector<StepInterval> steps_of(const MotionModel& model) {
   return all;
 }
 
-/// The block with the point elsewhere; nothing if it has no such point.
-std::optional<Block> moved(const Block& block, const StepInterval& step, double by) {
-  Block out = block;
-  bool any = false;
-  for (Factor& f : out.basis.factors) {
-    if (f.shape != Factor::Shape::kAtLeast || !(f.axis == step.axis)) continue;
-    for (double& point : f.points) {
-      if (point != step.at) continue;
-      point += by;
-      any = true;
-    }
+/// The columns of a block that jump at a step, as flags of all products of the basis; empty: none.
+std::vector<bool> jumping_products(const Basis& basis, const StepInterval& step) {
+  std::vector<bool> jump;
+  for (std::size_t f = 0; f < basis.factors.size(); ++f) {
+    const Factor& factor = basis.factors[f];
+    if (factor.shape != Factor::Shape::kAtLeast || !(factor.axis == step.axis)) continue;
+    const auto at = std::find(factor.points.begin(), factor.points.end(), step.at);
+    if (at == factor.points.end()) continue;
+    std::size_t before = 1, after = 1;
+    for (std::size_t g = 0; g < basis.factors.size(); ++g) (g < f ? before : after) *= basis.factors[g].size();
+    after /= factor.size();
+    const auto own = static_cast<std::size_t>(at - factor.points.begin());
+    for (std::size_t i = 0; i < before * factor.size() * after; ++i)
+      jump.push_back(!factor.known.empty() || i / after % factor.size() == own);
+    return jump;
   }
-  return any ? std::optional(out) : std::nullopt;
+  return jump;
 }
 
-/// The change of the effects by each move of a step: one sum of columns per move.
-ColumnSums changes_of(const MotionModel& model, const StepInterval& step) {
+/// The block with the point of a step elsewhere.
+Block moved(Block block, const StepInterval& step, double by) {
+  for (Factor& f : block.basis.factors) {
+    if (f.shape != Factor::Shape::kAtLeast || !(f.axis == step.axis)) continue;
+    for (double& point : f.points)
+      if (point == step.at) point += by;
+  }
+  return block;
+}
+
+/// The jump of a term at a step, with the step at each of its places: one sum of columns per place, the present one last.
+struct Jumps {
   ColumnSums sums;
+  std::vector<Eigen::Index> columns;  ///< of the model, which the jump replaces
+};
+Jumps jumps_of(const MotionModel& model, const StepInterval& step) {
+  Jumps out;
   std::size_t index = 0;
   const double finest = finest_of(step.axis);
+  Eigen::Index column = kBaseColumns;
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
     Eigen::Index first = 0;
     for (const Block& block : model.terms[t].blocks) {
       const std::size_t of = index++;
       const auto n = static_cast<Eigen::Index>(block.basis.size());
-      const Eigen::VectorXd own = model.terms[t].coefficients.segment(first, n);
-      first += n;
-      if (t != step.term || !moved(block, step, 0)) continue;
-      for (int i = 0; i < 2 * kMovesToASide; ++i) {
-        const double by = move_of(i / 2, finest) * (i % 2 == 0 ? -1 : 1);
-        for (WeighedBlock& part : value_as_blocks(*moved(block, step, by), own))
-          sums.add(std::move(part.block), of, i, part.weight);
+      Eigen::VectorXd own = model.terms[t].coefficients.segment(first, n);
+      const std::vector<bool> jump = t == step.term ? jumping_products(block.basis, step) : std::vector<bool>{};
+      for (Eigen::Index i = 0; i < n && !jump.empty(); ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        if (jump[block.basis.chosen.empty() ? at : block.basis.chosen[at]])
+          out.columns.push_back(column + first + i);
+        else
+          own[i] = 0;
       }
-      for (WeighedBlock& part : value_as_blocks(block, own))
-        sums.add(std::move(part.block), of, 2 * kMovesToASide, part.weight);
+      first += n;
+      if (jump.empty()) continue;
+      for (int i = 0; i <= 2 * kMovesToASide; ++i) {
+        const double by = i == 2 * kMovesToASide ? 0 : move_of(i / 2, finest) * (i % 2 == 0 ? -1 : 1);
+        for (WeighedBlock& part : value_as_blocks(moved(block, step, by), own))
+          out.sums.add(std::move(part.block), of, i, part.weight);
+      }
     }
+    column += model.terms[t].coefficients.size();
   }
-  sums.finish(2 * kMovesToASide + 1);
-  // The moved effect less the one in place.
-  const Eigen::VectorXd in_place = sums.weights.col(2 * kMovesToASide);
-  sums.weights = (sums.weights.leftCols(2 * kMovesToASide).colwise() - in_place).eval();
-  return sums;
+  out.sums.finish(2 * kMovesToASide + 1);
+  return out;
 }
 
-/// By how much the log likelihood rises with each move, all else at its most likely values.
-Eigen::VectorXd rises_of(const Fitter& fitter, const FitState& state, const ColumnSums& changes) {
+/// By how much the log likelihood rises if the jump is moved, all else at its most likely values, its size included. Without its
+/// columns, the jump in place is an offset.
+Eigen::VectorXd rises_of(const Fitter& fitter, const FitState& state, const Jumps& jumps) {
   const MotionModel& model = state.model;
   std::vector<Block> blocks = blocks_of(model);
-  blocks.insert(blocks.end(), changes.blocks.begin(), changes.blocks.end());
+  blocks.insert(blocks.end(), jumps.sums.blocks.begin(), jumps.sums.blocks.end());
   LineariseOptions options{100, fitter.threads()};
-  options.of_block = &changes.of_block;
+  options.of_block = &jumps.sums.of_block;
   const std::vector<Unit> units = linearise(model, state.tracks.units(), blocks, options);
-  const Eigen::Index all = units.front().information.rows(), n = all - changes.weights.rows();
+  const Eigen::MatrixXd& weights = jumps.sums.weights;
+  const Eigen::Index all = units.front().information.rows(), n = all - weights.rows();
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(all, all);
   Eigen::VectorXd score = Eigen::VectorXd::Zero(all);
   for (const Unit& unit : units) {
@@ -115,19 +140,22 @@ Eigen::VectorXd rises_of(const Fitter& fitter, const FitState& state, const Colu
     score.segment(first, own) -= term.precision.cwiseProduct(term.coefficients);
     first += own;
   }
-  const Eigen::MatrixXd cross = information.topRightCorner(n, all - n) * changes.weights;
-  const Eigen::LDLT<Eigen::MatrixXd> solver(information.topLeftCorner(n, n));
-  const Eigen::VectorXd of_changes = changes.weights.transpose() * score.tail(all - n);
-  const Eigen::MatrixXd own =
-      changes.weights.transpose() * information.bottomRightCorner(all - n, all - n) * changes.weights;
-  const Eigen::VectorXd start = score.head(n);
-  const double before = 0.5 * start.dot(solver.solve(start));
-  Eigen::VectorXd rises(cross.cols());
-  for (Eigen::Index i = 0; i < rises.size(); ++i) {
-    const Eigen::VectorXd left = start - cross.col(i);
-    rises[i] = of_changes[i] - 0.5 * own(i, i) + 0.5 * left.dot(solver.solve(left)) - before;
+  std::vector<Eigen::Index> others;
+  for (Eigen::Index i = 0; i < n; ++i)
+    if (std::find(jumps.columns.begin(), jumps.columns.end(), i) == jumps.columns.end()) others.push_back(i);
+  const Eigen::MatrixXd cross = information.topRightCorner(n, all - n)(others, Eigen::all) * weights,
+                        own = weights.transpose() * information.bottomRightCorner(all - n, all - n) * weights;
+  const Eigen::VectorXd of_jumps = weights.transpose() * score.tail(all - n);
+  const Eigen::LDLT<Eigen::MatrixXd> solver(information(others, others));
+  const Eigen::Index in_place = weights.cols() - 1;
+  const Eigen::VectorXd start = solver.solve(score(others) + cross.col(in_place));
+  Eigen::VectorXd values(weights.cols());
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    const double left = of_jumps[i] + own(i, in_place) - cross.col(i).dot(start),
+                 size = own(i, i) - cross.col(i).dot(solver.solve(cross.col(i)));
+    values[i] = size > 1e-12 * own(in_place, in_place) ? 0.5 * left * left / size : 0;
   }
-  return rises;
+  return (values.array() - values[in_place]).head(in_place);
 }
 
 /// Where the likelihood has fallen by `most` below its maximum on one side, between the moves; nothing: nowhere.
@@ -149,9 +177,9 @@ std::vector<StepInterval> step_intervals_of(const Fitter& fitter, const FitState
                                             const Uncertainty& uncertainty) {
   std::vector<StepInterval> steps = steps_of(state.model);
   for (StepInterval& step : steps) {
-    const ColumnSums changes = changes_of(state.model, step);
-    if (changes.blocks.empty()) continue;
-    const Eigen::VectorXd rises = rises_of(fitter, state, changes);
+    const Jumps jumps = jumps_of(state.model, step);
+    if (jumps.sums.blocks.empty()) continue;
+    const Eigen::VectorXd rises = rises_of(fitter, state, jumps);
     const double highest = std::max(0.0, rises.maxCoeff()), finest = finest_of(step.axis),
                  most = kStepDrop95 * uncertainty.dispersion;
     if (const auto below = end_of(rises, 0, highest, most, finest)) step.low = step.at - *below;
