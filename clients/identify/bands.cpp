@@ -202,7 +202,7 @@ std::vector<Group> groups_of(const Term& term) {
   return groups;
 }
 
-/// What may be drawn as one curve: the groups, then each of their blocks alone, as with curves over several covariates.
+/// Candidates for one drawn curve: the groups, then each of their blocks alone, because a term may have curves over several covariates.
 std::vector<Group> drawn_groups_of(const Term& term) {
   std::vector<Group> groups = groups_of(term);
   const std::size_t wholes = groups.size();

@@ -165,12 +165,14 @@ void Coverage::add_numbers(const Scene& scene, const json& result) {
     for (const auto& [name, truth] : effect.numbers) {
       // Of several steps, the one nearest to the true one.
       const json* best = nullptr;
-      for (const json& found : result.at("effects"))
-        for (const json& number : found.value("numbers", json::array()))
+      for (const json& found : result.at("effects")) {
+        if (!found.contains("numbers")) continue;
+        for (const json& number : found["numbers"])
           if (number.at("name") == name &&
               (best == nullptr || std::abs(number.at("value").get<double>() - truth) <
                                       std::abs(best->at("value").get<double>() - truth)))
             best = &number;
+      }
       if (best == nullptr) {
         ++without_number_[name];
         continue;
