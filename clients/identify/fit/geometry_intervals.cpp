@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kFirst_mm = 0.15, kFarthest_mm = 10;
 /// Samples by which the disc centre is judged. More would narrow its interval, and take a noticeable share of the time.
-constexpr std::size_t kSamplesOfCentre = 4000;
+constexpr std::size_t kSamplesOfCentre = 2000;
 
 struct Side {
   double Walls::*wall;
@@ -28,7 +28,7 @@ constexpr std::array<Side, 4> kSides = {{{&Walls::x_low_mm, &Sample::x_mm},
 
 /// Tracks of the fit that came near a wall, at most kMost.
 std::vector<const TrackView*> tracks_near(const FitState& state, const Side& side) {
-  constexpr std::size_t kMost = 8;
+  constexpr std::size_t kMost = 4;
   constexpr double kNear_mm = 8;
   constexpr std::ptrdiff_t kFewest = 5;
   const BaseParameters& base = state.model.base;
