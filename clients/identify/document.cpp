@@ -9,6 +9,7 @@
 #include <map>
 
 #include "clients/identify/bands.hpp"
+#include "clients/identify/estimates.hpp"
 #include "clients/identify/model/effect_records.hpp"
 #include "clients/identify/model/effect_text.hpp"
 #include "clients/identify/predict/final_check.hpp"
@@ -153,7 +154,9 @@ identification::Effect effect_of(const Findings& f, std::size_t t) {
   parameters["form"] = json_value(form_of(term));
   parameters["columns"] = json_value(term.coefficients.size());
   parameters["records"] = json_value(json_list(records));
-  parameters["bands_95"] = json_value(bands_of(f.found.fit.model, t, f.uncertainty));
+  parameters["bands_95"] = json_value(bands_of(f.found.fit.model, t, f.uncertainty, f.steps));
+  for (identification::Estimate& number : estimates_of(t, f.uncertainty, f.steps))
+    *out.add_numbers() = std::move(number);
   const bool judged = !f.rmse_without_mm.empty();
   *out.mutable_rmse_without_mm() = judged ? json_value(f.rmse_without_mm[t]) : json_null();
   *out.mutable_share_removed() = judged ? json_value(share_removed(f, f.rmse_without_mm[t])) : json_null();
@@ -174,6 +177,18 @@ void keep_shares_that_add_up(Effects& effects) {
   for (identification::Effect& effect : effects) *effect.mutable_share_removed() = json_null();
 }
 
+/// Adds the bands of another term of the same name. Its blocks count from the last one on.
+void add_bands(identification::Effect& to, const identification::Effect& from) {
+  constexpr const char* kBands = "bands_95";
+  auto& known = *(*to.mutable_parameters()->mutable_fields())[kBands].mutable_list_value();
+  const int before = known.values_size();
+  for (JsonValue band : from.parameters().fields().at(kBands).list_value().values()) {
+    auto& block = (*band.mutable_struct_value()->mutable_fields())["block"];
+    block = json_value(block.number_value() + before);
+    *known.add_values() = std::move(band);
+  }
+}
+
 /// One entry per effect. Terms of one name share an entry, with the largest loss among them.
 Effects effects_of(const Findings& f) {
   Effects effects;
@@ -185,6 +200,8 @@ Effects effects_of(const Findings& f) {
       *effects.Add() = std::move(effect);
       continue;
     }
+    known->mutable_numbers()->MergeFrom(effect.numbers());
+    add_bands(*known, effect);
     if (f.rmse_without_mm.empty()) continue;
     if (known->rmse_without_mm().number_value() < effect.rmse_without_mm().number_value())
       *known->mutable_rmse_without_mm() = effect.rmse_without_mm();
@@ -270,6 +287,8 @@ identification::Base base_sd_of(const Uncertainty& u) {
   out.set_wheel_base_mm(u.sd(kWheelBase));
   out.set_tracked_point_ahead_mm(u.sd(kAheadPoint));
   out.set_tracked_point_left_mm(u.sd(kLeftPoint));
+  out.set_bias_mean_mm_s(u.bias_mean_sd_mm_s);
+  out.set_bias_sd_mm_s(u.bias_sd_sd_mm_s);
   return out;
 }
 
@@ -286,22 +305,29 @@ identification::Numbering entry_of(const Numbering& numbering) {
 }
 
 /// Where contacts and walls act, and what the data say about it.
-identification::DiscCentre disc_centre_of(const MotionModel& model) {
+identification::DiscCentre disc_centre_of(const MotionModel& model, const GeometryIntervals& intervals) {
   constexpr double kSame_mm = 3, kTold = 3;
   const bool tracked = std::abs(model.base.centre_mm - model.base.ahead_mm) < kSame_mm;
   const std::string where =
       tracked ? "at the tracked point"
               : fmt::format("{:.1f} mm ahead of the drive's reference point", model.base.centre_mm);
   const double evidence = model.centre_evidence;
-  const std::string why = evidence == 0 ? "assumed: not identifiable from these data"
-                          : evidence > kTold
+  const bool bounded = intervals.centre_low_mm && intervals.centre_high_mm;
+  const std::string why = evidence > kTold
                               ? fmt::format("determined by contacts, with {:.0f} nat of log likelihood", evidence)
-                              : std::string("determined by how near robots come to each other");
+                          : bounded       ? std::string("determined by contacts")
+                          : evidence == 0 ? std::string("assumed: not identifiable from these data")
+                                          : std::string("determined by how near robots come to each other");
   identification::DiscCentre out;
   out.set_ahead_mm(model.base.centre_mm);
   out.set_at_tracked_point(tracked);
   out.set_log_likelihood_over_alternative(evidence);
-  out.set_in_words(fmt::format("Contacts and walls act {} ({}).", where, why));
+  const std::string interval = bounded ? fmt::format("; 95 % interval {:.1f} to {:.1f} mm",
+                                                     *intervals.centre_low_mm, *intervals.centre_high_mm)
+                                       : "";
+  out.set_in_words(fmt::format("Contacts and walls act {} ({}{}).", where, why, interval));
+  if (intervals.centre_low_mm) out.set_low_mm(*intervals.centre_low_mm);
+  if (intervals.centre_high_mm) out.set_high_mm(*intervals.centre_high_mm);
   return out;
 }
 
@@ -496,12 +522,14 @@ identification::Result result_of(const Findings& f, const MeasuredSet& judged, d
   for (const Ambiguity& a : f.found.ambiguous) *out.add_ambiguous() = ambiguous_of(a);
   *out.mutable_base() = base_of(after.base);
   *out.mutable_base_sd() = base_sd_of(f.uncertainty);
-  *out.mutable_disc_centre() = disc_centre_of(after);
+  *out.mutable_disc_centre() = disc_centre_of(after, f.geometry);
   add_robots(out, f, judged);
   *out.mutable_noise() = noise_of(after.noise);
   *out.mutable_noise_low() = noise_of(f.noise.low);
   *out.mutable_noise_high() = noise_of(f.noise.high);
   *out.mutable_walls() = walls_of(after.walls);
+  *out.mutable_walls_low() = walls_of(f.geometry.low);
+  *out.mutable_walls_high() = walls_of(f.geometry.high);
   return out;
 }
 
@@ -515,11 +543,11 @@ identification::Identification document_of(const Findings& f, const MeasuredSet&
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
     const std::vector<proto::Effect> written = effects_of_term(model.terms[t]);
     for (identification::EffectCurve& curve : curves_of(model.terms[t].name, written)) {
-      set_band(curve, model, t, f.uncertainty);
+      set_band(curve, model, t, f.uncertainty, f.steps);
       *out.add_effect_curves() = std::move(curve);
     }
     for (identification::EffectMap& map : maps_of(model.terms[t].name, written)) {
-      set_band(map, model, t, f.uncertainty);
+      set_band(map, model, t, f.uncertainty, f.steps);
       *out.add_effect_maps() = std::move(map);
     }
   }

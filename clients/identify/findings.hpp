@@ -7,9 +7,11 @@
 #include <utility>
 #include <vector>
 
+#include "clients/identify/fit/geometry_intervals.hpp"
 #include "clients/identify/fit/noise_fit.hpp"
 #include "clients/identify/fit/noise_samples.hpp"
 #include "clients/identify/fit/numbering.hpp"
+#include "clients/identify/fit/step_intervals.hpp"
 #include "clients/identify/fit/uncertainty.hpp"
 #include "clients/identify/noise_effects.hpp"
 #include "clients/identify/predict/evaluation.hpp"
@@ -51,9 +53,11 @@ struct Findings {
   std::vector<double> rmse_without_mm;  ///< by term, on held-out data; empty if nothing is held out
   FinalCheck check;
   Unexplained unexplained;
-  Numbering numbering;      ///< of the robots, by the base model
-  Uncertainty uncertainty;  ///< of the written model
-  NoiseInterval noise;      ///< of its noise
+  Numbering numbering;              ///< of the robots, by the base model
+  Uncertainty uncertainty;          ///< of the written model
+  std::vector<StepInterval> steps;  ///< of its effects
+  GeometryIntervals geometry;       ///< of its walls and of its disc centre
+  NoiseInterval noise;              ///< of its noise
   /// Ends of the 95 % interval of its lag, if it has one.
   std::optional<std::pair<double, double>> command_lag_s;
   std::map<std::uint32_t, NoiseRatio> noise_ratios;  ///< by robot

@@ -251,6 +251,8 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   if (f.numbering.anew()) f.numbering = numbering_of(fitter, f.found.fit);
   assess(f, fitter, train, test, evaluation, reported);
   f.uncertainty = uncertainty_of(fitter, f.found.fit);
+  f.steps = step_intervals_of(fitter, f.found.fit, f.uncertainty);
+  f.geometry = geometry_intervals_of(fitter, f.found.fit, f.uncertainty);
   if (f.found.fit.model.base.command_lag_s != 0) f.command_lag_s = fitter.command_lag_interval(f.found.fit);
   const std::vector<NoiseSample> noise_samples = noise_samples_of(f.found.fit, options.threads);
   f.noise_ratios = noise_ratios_of(noise_samples);

@@ -216,6 +216,18 @@ class VarianceFit {
     return beta;
   }
 
+  /// The posterior covariance of the coefficients, by the curvature at these.
+  [[nodiscard]] Eigen::MatrixXd covariance(const Eigen::MatrixXd& columns, const Eigen::VectorXd& beta) const {
+    Eigen::MatrixXd info = Eigen::MatrixXd::Identity(beta.size(), beta.size()) / (kPrior_sd * kPrior_sd);
+    for (Eigen::Index i = 0; i < columns.rows(); ++i) {
+      const auto row = columns.row(i);
+      const double scale = std::exp(given_[i] + level_ + row.dot(beta));
+      info.noalias() +=
+          samples_[static_cast<std::size_t>(i)].score(scale).information / overdispersion_ * row.transpose() * row;
+    }
+    return info.ldlt().solve(Eigen::MatrixXd::Identity(beta.size(), beta.size()));
+  }
+
   /// The log scale that the samples share, given the accepted effects.
   [[nodiscard]] double level() const { return level_; }
 
@@ -283,6 +295,8 @@ std::optional<NoiseEffect> accepted(const VarianceFit& fit, const NoiseForm& can
   if (!(out.most > kLeastRatio * out.least)) return std::nullopt;
   for (std::size_t i = 0; i < samples.size(); ++i) out.gain += fit.gain(candidate.columns, beta, i);
   out.scale = candidate.scale(beta, fit.level());
+  out.band = noise_band_of([&](const Eigen::VectorXd& of) { return candidate.scale(of, fit.level()); }, beta,
+                           fit.covariance(candidate.columns, beta));
   return out;
 }
 
@@ -349,6 +363,7 @@ identification::Effect entry_of(const NoiseEffect& found) {
   evidence.set_degrees(found.degrees);
   auto& parameters = *out.mutable_parameters()->mutable_fields();
   parameters["form"] = json_value("scale of the noise");
+  *parameters["bands_95"].mutable_list_value()->add_values() = found.band;
   parameters["records"] = json_value(json_list(std::vector{found.scale.ShortDebugString()}));
   *out.mutable_rmse_without_mm() = json_null();
   *out.mutable_share_removed() = json_null();

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "clients/identify/fit/noise_samples.hpp"
+#include "clients/identify/noise_band.hpp"
 #include "idl/identification.pb.h"
 #include "idl/model.pb.h"
 
@@ -21,6 +22,7 @@ struct NoiseEffect {
   double held_out = 0, held_out_se = 0;  ///< cross-validated log score, nat, and its standard error over stretches
   proto::Function scale;                 ///< factor of the noise's standard deviation
   double least = 1, most = 1;            ///< of that factor
+  JsonValue band;                        ///< of that factor, 95 %
 };
 
 /// Effects in the order in which they were accepted: each passed a score test given those before it, and raises the cross-validated

@@ -11,12 +11,43 @@
 #include "core/stats/distributions.hpp"
 #include "core/stats/moments.hpp"
 #include "tests/identify/truth/dice.hpp"
+#include "tests/identify/truth/world.hpp"
 #include "tests/identify/verdict.hpp"
 
 namespace kilotwin::truth {
 namespace {
 
 using nlohmann::json;
+
+/// A situation with what it points to.
+struct Place {
+  Situation at;
+  std::vector<Vec> discs;
+  std::vector<Motion> motions;
+};
+
+/// A robot with others beside it, over a count of neighbours or the distance of the nearest one. All drive.
+std::optional<Place> among_others(const json& axis, double value) {
+  const double radius_mm = axis.value("radius_mm", 0.0);
+  if (axis.contains("other_robot") || axis.value("others", "") == "resting") return std::nullopt;
+  int others = 0;
+  double distance_mm = 0;
+  constexpr double kWhole = 1e-6, kInside = 0.9;
+  if (axis.at("of") == "neighbours" && std::abs(value - std::round(value)) < kWhole) {
+    others = static_cast<int>(std::round(value));
+    distance_mm = kInside * radius_mm;
+  } else if (axis.at("of") == "nearest" && value < radius_mm - kWhole) {
+    others = 1;
+    distance_mm = value;
+  } else {
+    return std::nullopt;
+  }
+  Place place;
+  place.discs.push_back({0, 0});
+  for (int i = 0; i < others; ++i) place.discs.push_back({distance_mm, 0});
+  place.motions.assign(place.discs.size(), Motion::kStraight);
+  return place;
+}
 
 /// A situation of a robot that drives straight ahead, with a value of the covariate of a band.
 std::optional<Situation> situation_at(const std::string& covariate, const json& at) {
@@ -41,8 +72,21 @@ std::optional<Situation> situation_at(const std::string& covariate, const json& 
   return s;
 }
 
+std::optional<Place> place_at(const std::string& covariate, const json& axis, const json& at) {
+  if (covariate == "neighbours" && axis.contains("of") && at.is_number()) {
+    std::optional<Place> place = among_others(axis, at.get<double>());
+    if (place) place->at = *situation_at("time", 0);
+    return place;
+  }
+  const std::optional<Situation> situation = situation_at(covariate, at);
+  return situation ? std::optional(Place{*situation, {}, {}}) : std::nullopt;
+}
+
 /// The relative change of both wheels' speeds. Nothing if the effects act otherwise.
-std::optional<double> change_of_speed(const Scene& scene, const Situation& at) {
+std::optional<double> change_of_speed(const Scene& scene, const Place& place) {
+  Situation at = place.at;
+  at.discs = &place.discs;
+  at.motions = &place.motions;
   Push push;
   for (const Effect& effect : scene.effects)
     if (effect.push) effect.push(at, push);
@@ -69,9 +113,14 @@ std::vector<BandPoint> band_of(const Scene& scene, const json& result) {
   const bool named = std::any_of(scene.effects.begin(), scene.effects.end(),
                                  [&](const Effect& effect) { return names(effect, {covariate}); });
   if (!named) return points;
-  for (const json& band : effects[0].at("parameters").value("bands_95", json::array())) {
+  const json bands = effects[0].at("parameters").value("bands_95", json::array());
+  for (const json& band : bands) {
+    // Of a sum over several functions of the neighbours no one band has the values.
+    if (covariate == "neighbours" && bands.size() > 1) break;
+    const json axis = band.value("axes", json::array()).size() == 1 ? band["axes"][0] : json::object();
+    if (axis.contains("forget_s")) continue;  // not the time since the start
     for (std::size_t i = 0; i < band.at("at").size(); ++i) {
-      const std::optional<Situation> at = situation_at(covariate, band.at("at")[i]);
+      const std::optional<Place> at = place_at(covariate, axis, band.at("at")[i]);
       if (const std::optional<double> truth = at ? change_of_speed(scene, *at) : std::nullopt)
         points.push_back({*truth, band.at("value")[i], band.at("low")[i], band.at("high")[i]});
     }
@@ -111,6 +160,40 @@ void Coverage::add_interval(const std::string& set, const std::string& parameter
   ++share.all;
 }
 
+void Coverage::add_numbers(const Scene& scene, const json& result) {
+  for (const Effect& effect : scene.effects) {
+    for (const auto& [name, truth] : effect.numbers) {
+      // Of several steps, the one nearest to the true one.
+      const json* best = nullptr;
+      for (const json& found : result.at("effects")) {
+        if (!found.contains("numbers")) continue;
+        for (const json& number : found["numbers"])
+          if (number.at("name") == name &&
+              (best == nullptr || std::abs(number.at("value").get<double>() - truth) <
+                                      std::abs(best->at("value").get<double>() - truth)))
+            best = &number;
+      }
+      if (best == nullptr) {
+        ++without_number_[name];
+        continue;
+      }
+      std::string word = name;
+      std::replace(word.begin(), word.end(), ' ', '_');
+      add_interval(scene.name, word, truth, best->value("low", -INFINITY), best->value("high", INFINITY));
+    }
+  }
+}
+
+void Coverage::add_walls(const Scene& scene, const json& result) {
+  if (!result.contains("walls_low") || !result.contains("walls_high") || scene.width_mm <= 0) return;
+  for (const char* side : {"x_low_mm", "x_high_mm", "y_low_mm", "y_high_mm"}) {
+    const json &low = result["walls_low"], &high = result["walls_high"];
+    if (!low.contains(side) || !high.contains(side) || low[side].is_null() || high[side].is_null()) continue;
+    const double half_mm = (side[0] == 'x' ? scene.width_mm : scene.height_mm) / 2 - kDiscRadius_mm;
+    add_interval(scene.name, "wall_mm", side[2] == 'l' ? -half_mm : half_mm, low[side], high[side]);
+  }
+}
+
 void Coverage::add(const std::string& kind, const Scene& scene, const Play& played,
                    const std::filesystem::path& out) {
   std::ifstream in(out / "result.json");
@@ -139,6 +222,8 @@ void Coverage::add(const std::string& kind, const Scene& scene, const Play& play
     // Null: a variance that may be as large as any.
     add_interval(scene.name, parameter, truth, low, high.is_null() ? INFINITY : high.get<double>());
   };
+  add_numbers(scene, result);
+  add_walls(scene, result);
   base("wheel_base_mm", scene.wheel_base_mm);
   base("tracked_point_ahead_mm", scene.tracked_ahead_mm);
   base("tracked_point_left_mm", 0);
@@ -148,6 +233,7 @@ void Coverage::add(const std::string& kind, const Scene& scene, const Play& play
   if (!scene.effects.empty() && band.empty()) return;
   base("straight_speed_mm_s", level * scene.straight_mm_s);
   base("turn_speed_mm_s", level * scene.turn_mm_s);
+  base("bias_mean_mm_s", level * scene.bias_mean_mm_s);
   for (const json& robot : result.at("robots")) {
     const Wheels<double>& bias = played.individuals.at(robot.at("robot").get<std::size_t>()).bias_mm_s;
     with_sd("bias_left_mm_s", level * bias.left, robot.at("bias_left_mm_s"), robot.at("sd_left_mm_s"));
@@ -185,6 +271,7 @@ void Coverage::print() const {
     fmt::print("{}: bands of {} sets hold the truth at {:.1f} % of {} points, standard error {:.1f}\n", band,
                sets.size(), shares.mean(), points, shares.standard_error());
   }
+  for (const auto& [number, sets] : without_number_) fmt::print("{}: {} sets without this number\n", number, sets);
   for (const auto& [kind, sets] : without_band_) fmt::print("{}: {} sets without a band to compare\n", kind, sets);
 }
 

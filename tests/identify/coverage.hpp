@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -32,11 +33,15 @@ class Coverage {
 
  private:
   void add_interval(const std::string& set, const std::string& parameter, double truth, double low, double high);
+  /// The true numbers of effects: centres, instants.
+  void add_numbers(const Scene&, const nlohmann::json& result);
+  void add_walls(const Scene&, const nlohmann::json& result);
   std::map<std::string, Share> intervals_;
   /// By scene and effect found: the points of each set's band.
   std::map<std::string, std::vector<Share>> bands_;
   /// By scene: sets without a band to compare. The effect found has none, or is not the only one, or acts otherwise than the truth.
   std::map<std::string, int> without_band_;
+  std::map<std::string, int> without_number_;  ///< by number: sets in which no effect has it
 };
 
 }  // namespace kilotwin::truth

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <algorithm>
 #include <functional>
 
 #include "clients/identify/fit/contact_gate.hpp"
@@ -20,7 +21,11 @@ class Sensitivities {
   /// `needed`: products of all columns, those of the biases last.
   Sensitivities(const MotionModel& model, const std::vector<Block>& blocks, const LineariseOptions& options,
                 const NeededProducts& needed)
-      : model_(model), blocks_(blocks), needed_(needed), cluster_s_(options.cluster_s) {
+      : model_(model),
+        blocks_(blocks),
+        needed_(needed),
+        of_block_(options.of_block),
+        cluster_s_(options.cluster_s) {
     for (std::size_t t = 0; t < model.terms.size(); ++t) {
       Eigen::Index first = 0;
       for (const Block& block : model.terms[t].blocks) {
@@ -28,6 +33,7 @@ class Sensitivities {
         first += static_cast<Eigen::Index>(block.basis.size());
       }
     }
+    if (of_block_ != nullptr) gains_.resize(own_.size());
     columns_ = columns_of(blocks);
     all_ = columns_ + kBiases;
     pose_.setZero(3, all_);
@@ -92,6 +98,7 @@ class Sensitivities {
     }
     Eigen::Index c = kBaseColumns;
     Wheels replaced;
+    std::fill(gains_.begin(), gains_.end(), Wheels{});
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
       const Block& block = blocks_[b];
       const Eigen::Index n = shared_[b].columns, first = c;
@@ -105,8 +112,10 @@ class Sensitivities {
       const double* const right_values = shared_[b].per_wheel ? values_of(b, record.middle, 1) : left_values;
       // Gains are factors: a term's columns do not act on the term's own gain.
       Wheels without = replaced;
+      if (of_block_ != nullptr && b >= own_.size()) without = gains_[(*of_block_)[b - own_.size()]];
       if (b < own_.size()) {
         without = own_gains(b, left_values, right_values);
+        if (of_block_ != nullptr) gains_[b] = without;
         if (own_[b].replaced) {
           replaced.left *= without.left;
           replaced.right *= without.right;
@@ -330,6 +339,8 @@ class Sensitivities {
   const std::vector<Block>& blocks_;
   const NeededProducts& needed_;
   std::vector<Own> own_;  ///< of the first blocks
+  const std::vector<std::size_t>* const of_block_;
+  std::vector<Wheels> gains_;  ///< of the model's blocks in the present step, if others change their values
   const double cluster_s_;
   Eigen::Index columns_ = 0, all_ = 0, filled_ = 0;
   PoseRows pose_, seen_;

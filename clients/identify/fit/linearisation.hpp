@@ -43,6 +43,8 @@ struct LineariseOptions {
   /// Index of a term that the blocks after the model's replace; below 0: they are added to all terms.
   int instead_of = -1;
   const ColumnGroups* needed = nullptr;  ///< null: all entries of the information
+  /// Of each block after the model's: index of the model's block whose value it changes. Null: they are effects of their own.
+  const std::vector<std::size_t>* of_block = nullptr;
 };
 
 /// units[i] are the tracks of unit i. Columns: BaseColumn, then the blocks in order.

@@ -11,16 +11,20 @@
 namespace kilotwin::identify {
 namespace {
 
-/// Variance of the scores of clusters over what the information expects; 1 or more. Few clusters do not tell it.
+/// Variance of the scores of clusters over what the information expects; 1 or more. Few clusters do not tell it. `covariance`: of the
+/// first parameters.
 double dispersion_of(const std::vector<Unit>& units, const Eigen::MatrixXd& covariance) {
   constexpr Eigen::Index kFewest = 40;
   Eigen::Index clusters = 0;
   double sum = 0, expected = 0;
+  const Eigen::Index n = covariance.rows();
   for (const Unit& unit : units) {
     clusters += unit.cluster_scores.cols();
-    for (Eigen::Index k = 0; k < unit.cluster_scores.cols(); ++k)
-      sum += unit.cluster_scores.col(k).dot(covariance * unit.cluster_scores.col(k));
-    expected += (covariance * unit.information).trace();
+    for (Eigen::Index k = 0; k < unit.cluster_scores.cols(); ++k) {
+      const auto score = unit.cluster_scores.col(k).head(n);
+      sum += score.dot(covariance * score);
+    }
+    expected += covariance.cwiseProduct(unit.information.topLeftCorner(n, n)).sum();
   }
   return clusters < kFewest || expected <= 0 ? 1 : std::max(1.0, sum / expected);
 }
@@ -44,73 +48,134 @@ Eigen::MatrixXd with_bias_mean(const std::vector<Unit>& units, const Eigen::Matr
   return out;
 }
 
-}  // namespace
+/// The information of other parameters, of which the columns are weighted sums.
+Unit in_parameters(const Unit& unit, const Eigen::MatrixXd& by_parameter) {
+  Unit out;
+  out.robot = unit.robot;
+  out.information = by_parameter.transpose() * unit.information * by_parameter;
+  out.cluster_scores = by_parameter.transpose() * unit.cluster_scores;
+  out.bias_covariance = unit.bias_covariance;
+  out.bias_by_column = unit.bias_by_column * by_parameter;
+  return out;
+}
 
-Uncertainty uncertainty_of(const Fitter& fitter, const FitState& state) {
+/// The inverse of a positive definite matrix whose rows may have very different units.
+Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& information) {
+  const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
+  return scale.asDiagonal() *
+         scaled.ldlt().solve(Eigen::MatrixXd::Identity(information.rows(), information.cols())) *
+         scale.asDiagonal();
+}
+
+/// Priors of base parameters and coefficients, and what robots that touch tell about the scale of a camera map.
+void add_priors(const Fitter& fitter, const FitState& state, Eigen::MatrixXd& information, Eigen::Index n) {
   const MotionModel& model = state.model;
-  const std::vector<Unit> units = linearise(model, state.tracks.units(), blocks_of(model), {100, fitter.threads()});
-  const Eigen::Index n = units.front().information.rows();
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);
-  Eigen::VectorXd unused = Eigen::VectorXd::Zero(n);
-  for (const Unit& unit : units) information += unit.information;
+  Eigen::VectorXd unused = Eigen::VectorXd::Zero(information.rows());
   fitter.add_base_prior(model, information, unused);
   Eigen::Index first = kBaseColumns;
   for (const Term& term : model.terms) {
     information.diagonal().segment(first, term.precision.size()) += term.precision;
     first += term.precision.size();
   }
-  // Discs that touch tell the common scale of a camera map, the speeds and the wheel base.
   if (const Eigen::VectorXd by_scale = log_scale_by_coefficients(model); by_scale.size() > 0 && state.scale)
-    information.bottomRightCorner(by_scale.size(), by_scale.size()).noalias() +=
+    information.block(n - by_scale.size(), n - by_scale.size(), by_scale.size(), by_scale.size()).noalias() +=
         by_scale * by_scale.transpose() / (state.scale->relative_sd() * state.scale->relative_sd());
-  const double bias_precision = 1 / (model.base.bias_sd_mm_s * model.base.bias_sd_mm_s);
-  const Eigen::MatrixXd with_mean = with_bias_mean(units, information, model.base.bias_sd_mm_s);
-  Eigen::MatrixXd covariance = with_mean.ldlt().solve(Eigen::MatrixXd::Identity(n + 1, n + 1));
-  Uncertainty out;
-  covariance *= dispersion_of(units, covariance.topLeftCorner(n, n));
-  out.covariance = covariance.topLeftCorner(n, n);
-  // The mean of the biases where the columns are known: it follows them, and has a variance of its own.
-  const Eigen::RowVectorXd mean_by_column = -with_mean.row(n).head(n) / with_mean(n, n);
-  const double mean_variance = 1 / with_mean(n, n);
-  // A robot with several units has the precision-weighted mean of their biases.
-  struct Sums {
-    Eigen::Matrix2d precision = Eigen::Matrix2d::Zero();
-    Eigen::MatrixXd by_column;
-    double units = 0;
-  };
-  std::map<std::uint32_t, Sums> robots;
+}
+
+/// A robot with several units has the precision-weighted mean of their biases.
+struct BiasSums {
+  Eigen::Matrix2d precision = Eigen::Matrix2d::Zero();
+  Eigen::MatrixXd by_column;
+  double units = 0;
+};
+std::map<std::uint32_t, BiasSums> bias_sums_of(const std::vector<Unit>& units) {
+  std::map<std::uint32_t, BiasSums> robots;
   for (const Unit& unit : units) {
-    Sums& sums = robots[unit.robot];
+    BiasSums& sums = robots[unit.robot];
     const Eigen::Matrix2d precision = unit.bias_covariance.inverse();
-    if (sums.by_column.size() == 0) sums.by_column = Eigen::MatrixXd::Zero(2, n);
+    if (sums.by_column.size() == 0) sums.by_column = Eigen::MatrixXd::Zero(2, unit.bias_by_column.cols());
     sums.precision += precision;
     sums.by_column += precision * unit.bias_by_column;
     sums.units += 1;
   }
+  return robots;
+}
+
+/// The standard deviation of the biases' standard deviation s, by its Fisher information. Biases that the data give with the
+/// precision D have the marginal covariance V = D^-1 + s^2, of which s has the information 2 s^2 tr V^-2.
+double sd_of_bias_sd(const std::map<std::uint32_t, BiasSums>& robots, double sd_mm_s) {
+  const double square = sd_mm_s * sd_mm_s;
+  // The prior of the fit: as many biases at the ARGoS paper's value.
+  double information = 2 * Fitter::kPriorBiases / square;
+  for (const auto& [robot, sums] : robots) {
+    const Eigen::Matrix2d data = sums.precision - sums.units / square * Eigen::Matrix2d::Identity();
+    const Eigen::Matrix2d marginal = data * (Eigen::Matrix2d::Identity() + square * data).inverse();
+    information += 2 * square * (marginal * marginal).trace();
+  }
+  return 1 / std::sqrt(information);
+}
+
+DataExtent extent_of(const PreparedSet& tracks) {
+  DataExtent out;
+  double low = 1e300, high = -1e300;
+  for (const TrackView& view : tracks.views()) {
+    for (const Sample& s : view.track->samples) {
+      low = std::min({low, s.x_mm, s.y_mm});
+      high = std::max({high, s.x_mm, s.y_mm});
+      out.duration_s = std::max(out.duration_s, s.time_s);
+    }
+  }
+  out.half_side_mm = std::max(1.0, (high - low) / 2);
+  return out;
+}
+
+}  // namespace
+
+Uncertainty uncertainty_of(const Fitter& fitter, const FitState& state) {
+  const MotionModel& model = state.model;
+  Uncertainty out;
+  out.held = held_numbers_of(model, extent_of(state.tracks));
+  std::vector<Block> blocks = blocks_of(model);
+  blocks.insert(blocks.end(), out.held.columns.blocks.begin(), out.held.columns.blocks.end());
+  LineariseOptions options{100, fitter.threads()};
+  options.of_block = &out.held.columns.of_block;
+  std::vector<Unit> units = linearise(model, state.tracks.units(), blocks, options);
+  const Eigen::Index columns = units.front().information.rows(), n = columns - out.held.columns.weights.rows(),
+                     parameters = n + out.held.size();
+  Eigen::MatrixXd by_parameter = Eigen::MatrixXd::Zero(columns, parameters);
+  by_parameter.topLeftCorner(n, n).setIdentity();
+  by_parameter.bottomRightCorner(columns - n, parameters - n) = out.held.columns.weights;
+  if (columns > n)
+    for (Unit& unit : units) unit = in_parameters(unit, by_parameter);
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(parameters, parameters);
+  for (const Unit& unit : units) information += unit.information;
+  add_priors(fitter, state, information, n);
+  information.bottomRightCorner(parameters - n, parameters - n) += out.held.precision;
+  const double bias_precision = 1 / (model.base.bias_sd_mm_s * model.base.bias_sd_mm_s);
+  const Eigen::MatrixXd with_mean = with_bias_mean(units, information, model.base.bias_sd_mm_s);
+  std::vector<Eigen::Index> given(static_cast<std::size_t>(n) + 1, parameters);
+  for (Eigen::Index i = 0; i < n; ++i) given[static_cast<std::size_t>(i)] = i;
+  const Eigen::MatrixXd held = inverse_of(with_mean(given, given)), all = inverse_of(with_mean);
+  out.dispersion = dispersion_of(units, held.topLeftCorner(n, n));
+  out.covariance = out.dispersion * held.topLeftCorner(n, n);
+  out.all = out.dispersion * all.topLeftCorner(parameters, parameters);
+  out.bias_mean_sd_mm_s = std::sqrt(out.dispersion * all(parameters, parameters));
+  // The mean of the biases where the columns are known: it follows them, and has a variance of its own.
+  const Eigen::RowVectorXd mean_by_column =
+      -with_mean.row(parameters).head(parameters) / with_mean(parameters, parameters);
+  const double mean_variance = 1 / with_mean(parameters, parameters);
+  const std::map<std::uint32_t, BiasSums> robots = bias_sums_of(units);
   for (const auto& [robot, sums] : robots) {
     const Eigen::Matrix2d alone = sums.precision.inverse();
     const Eigen::Vector2d by_mean = alone * Eigen::Vector2d::Constant(sums.units * bias_precision);
     const Eigen::Matrix2d own = alone + by_mean * mean_variance * by_mean.transpose();
     const Eigen::MatrixXd by = by_mean * mean_by_column - alone * sums.by_column;
-    out.biases[robot] = own + by * out.covariance * by.transpose();
-    out.given[robot] = {own, by};
+    out.biases[robot] = own + by * out.all * by.transpose();
+    out.given[robot] = {own, by.leftCols(n)};
   }
+  out.bias_sd_sd_mm_s = sd_of_bias_sd(robots, model.base.bias_sd_mm_s);
   return out;
-}
-
-ValueWithSd value_of(const MotionModel& model, std::size_t term, std::size_t block, const Situation& at,
-                     const Eigen::MatrixXd& covariance) {
-  Eigen::Index column = kBaseColumns, own = 0;
-  for (std::size_t t = 0; t < term; ++t) column += model.terms[t].coefficients.size();
-  for (std::size_t b = 0; b < block; ++b)
-    own += static_cast<Eigen::Index>(model.terms[term].blocks[b].basis.size());
-  const Basis& basis = model.terms[term].blocks[block].basis;
-  std::array<double, kMostColumns> values;
-  basis.evaluate(at, 0, values.data());
-  const auto n = static_cast<Eigen::Index>(basis.size());
-  const Eigen::Map<const Eigen::VectorXd> columns(values.data(), n);
-  const double variance = columns.dot(covariance.block(column + own, column + own, n, n) * columns);
-  return {columns.dot(model.terms[term].coefficients.segment(own, n)), std::sqrt(std::max(0.0, variance))};
 }
 
 }  // namespace kilotwin::identify

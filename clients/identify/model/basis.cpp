@@ -57,14 +57,33 @@ void Factor::evaluate(const Situation& s, std::size_t wheel, double* to) const {
   if (known.empty()) return evaluate_columns(s, wheel, to);
   std::array<double, kMostColumns> values;
   evaluate_columns(s, wheel, values.data());
+  collapse(values.data(), to);
+}
+
+void Factor::evaluate_at(double value, double and_value, double* to) const {
+  if (known.empty()) return columns_at(value, and_value, 0, to);
+  std::array<double, kMostColumns> values;
+  columns_at(value, and_value, 0, values.data());
+  collapse(values.data(), to);
+}
+
+void Factor::collapse(const double* values, double* to) const {
   double sum = plus;
   for (std::size_t i = 0; i < known.size(); ++i) sum += known[i] * values[i];
   to[0] = sum;
 }
 
 void Factor::evaluate_columns(const Situation& s, std::size_t wheel, double* to) const {
+  switch (shape) {
+    case Shape::kPointShift: return shifted(value_of(axis, s, wheel), s, to);
+    case Shape::kTravelling:
+      return columns_at(points[0] * s.x_mm + points[1] * s.y_mm - points[2] * s.time_s, 0, s.span_s, to);
+    default: return columns_at(value_of(axis, s, wheel), of_two() ? value_of(and_axis, s, wheel) : 0, s.span_s, to);
+  }
+}
+
+void Factor::columns_at(double c, double d, double span_s, double* to) const {
   std::array<double, kMostColumns + 1> a, b;
-  const double c = value_of(axis, s, wheel);
   switch (shape) {
     case Shape::kLinear: to[0] = (std::clamp(c, low, high) - low) / (high - low); return;
     case Shape::kCosines:
@@ -73,38 +92,31 @@ void Factor::evaluate_columns(const Situation& s, std::size_t wheel, double* to)
       return;
     case Shape::kCosines2:
       cosines(M_PI * unit_of(c, low, high, warp), count, a.data());
-      cosines(M_PI * unit_of(value_of(and_axis, s, wheel), and_low, and_high, 0), count, b.data());
+      cosines(M_PI * unit_of(d, and_low, and_high, 0), count, b.data());
       for (std::uint32_t sum = first; sum <= count; ++sum)
         for (std::uint32_t k = 0; k <= sum; ++k) *to++ = a[sum - k] * b[k];
       return;
     case Shape::kPolynomials2:
       legendre(2 * unit_of(c, low, high, warp) - 1, count, a.data());
-      legendre(2 * unit_of(value_of(and_axis, s, wheel), and_low, and_high, 0) - 1, count, b.data());
+      legendre(2 * unit_of(d, and_low, and_high, 0) - 1, count, b.data());
       for (std::uint32_t sum = 1; sum <= count; ++sum)
         for (std::uint32_t k = 0; k <= sum; ++k) *to++ = a[sum - k] * b[k];
       return;
     case Shape::kHarmonics:
+    case Shape::kTravelling:
       for (std::uint32_t k = 0; k < count; ++k) {
         to[2 * k] = std::cos((first + k) * c);
         to[2 * k + 1] = std::sin((first + k) * c);
       }
       return;
-    case Shape::kTravelling: {
-      const double phase = points[0] * s.x_mm + points[1] * s.y_mm - points[2] * s.time_s;
-      for (std::uint32_t k = 0; k < count; ++k) {
-        to[2 * k] = std::cos((first + k) * phase);
-        to[2 * k + 1] = std::sin((first + k) * phase);
-      }
-      return;
-    }
     case Shape::kTable:
       for (std::size_t i = 0; i < points.size(); ++i) to[i] = c == points[i] ? 1 : 0;
       return;
     case Shape::kAtLeast:
       // Within a sub-step: the fraction of the sub-step after the point.
       for (std::size_t i = 0; i < points.size(); ++i) {
-        to[i] = axis.of == Covariate::kTime && s.span_s > 0 ? std::clamp((c - points[i]) / s.span_s + 0.5, 0.0, 1.0)
-                                                            : (c >= points[i] ? 1 : 0);
+        to[i] = axis.of == Covariate::kTime && span_s > 0 ? std::clamp((c - points[i]) / span_s + 0.5, 0.0, 1.0)
+                                                          : (c >= points[i] ? 1 : 0);
       }
       return;
     case Shape::kLevelling:
@@ -123,7 +135,7 @@ void Factor::evaluate_columns(const Situation& s, std::size_t wheel, double* to)
     case Shape::kGrid: {
       const std::size_t columns = count, rows = points.size() / columns;
       const double u = unit_of(c, low, high, 0) * static_cast<double>(columns - 1);
-      const double v = unit_of(value_of(and_axis, s, wheel), and_low, and_high, 0) * static_cast<double>(rows - 1);
+      const double v = unit_of(d, and_low, and_high, 0) * static_cast<double>(rows - 1);
       const std::size_t i = std::min(static_cast<std::size_t>(u), columns - 2),
                         j = std::min(static_cast<std::size_t>(v), rows - 2);
       const double x = u - static_cast<double>(i), y = v - static_cast<double>(j);
@@ -131,7 +143,7 @@ void Factor::evaluate_columns(const Situation& s, std::size_t wheel, double* to)
       to[0] = (1 - y) * ((1 - x) * at[0] + x * at[1]) + y * ((1 - x) * at[columns] + x * at[columns + 1]);
       return;
     }
-    case Shape::kPointShift: shifted(c, s, to); return;
+    case Shape::kPointShift: return;
     case Shape::kWave:
       for (std::size_t i = 0; i < points.size(); ++i) {
         to[2 * i] = std::cos(2 * M_PI * c / points[i]);

@@ -48,12 +48,17 @@ struct Factor {
   [[nodiscard]] std::size_t size() const { return known.empty() ? columns() : 1; }
   [[nodiscard]] std::size_t columns() const;  ///< number of columns before a known curve collapses them
   void evaluate(const Situation&, std::size_t wheel, double* to) const;
+  /// The same at values of the covariates, whatever they depend on. kTravelling: `value` is the phase. Not for kPointShift.
+  void evaluate_at(double value, double and_value, double* to) const;
   /// Roughness of each column, 1 for the smoothest. The prior variance falls with the roughness.
   [[nodiscard]] std::vector<double> roughness() const;
   bool operator==(const Factor&) const = default;
 
  private:
   void evaluate_columns(const Situation&, std::size_t wheel, double* to) const;
+  /// `span_s`: as of Situation.
+  void columns_at(double value, double and_value, double span_s, double* to) const;
+  void collapse(const double* values, double* to) const;
   /// kPointShift. `c`: the distance.
   void shifted(double c, const Situation&, double* to) const;
 };

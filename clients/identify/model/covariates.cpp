@@ -61,6 +61,65 @@ double toward(const Axis& axis, const Situation& s) {
 
 }  // namespace
 
+const char* name_of(Covariate of) {
+  switch (of) {
+    case Covariate::kNothing: return "nothing";
+    case Covariate::kTime: return "time";
+    case Covariate::kX: return "x";
+    case Covariate::kY: return "y";
+    case Covariate::kRadius: return "radius";
+    case Covariate::kHeading: return "heading";
+    case Covariate::kCommand: return "command";
+    case Covariate::kSinceCommand: return "time_since_command";
+    case Covariate::kMotorTime: return "motor_time";
+    // The left motor drives the right-hand wheel (idl/effects.proto names motors, this model names wheels).
+    case Covariate::kLeftMotorTime: return "right_motor_time";
+    case Covariate::kRightMotorTime: return "left_motor_time";
+    case Covariate::kDrivenTime: return "driven_time";
+    case Covariate::kNeighbours: return "neighbours";
+    case Covariate::kNearest: return "nearest";
+    case Covariate::kDensity: return "density";
+    case Covariate::kBearing: return "nearest_bearing";
+    case Covariate::kPreviousCommand: return "previous_command";
+    case Covariate::kPreviousLasted: return "previous_lasted";
+    case Covariate::kLastTurn: return "last_turn";
+    case Covariate::kEarlierTurn: return "earlier_turn";
+    case Covariate::kCommandCount: return "command_count";
+    case Covariate::kSinceRest: return "since_rest";
+    case Covariate::kMotorTimeDifference: return "motor_time_difference";
+    case Covariate::kMotorTimeSum: return "motor_time_sum";
+    case Covariate::kTraffic: return "place";
+    case Covariate::kRobot: return "robot";
+    case Covariate::kRun: return "run";
+    case Covariate::kPointDistance: return "point_distance";
+  }
+  return "";
+}
+
+const char* unit_of(Covariate of) {
+  switch (of) {
+    case Covariate::kTime:
+    case Covariate::kSinceCommand:
+    case Covariate::kMotorTime:
+    case Covariate::kLeftMotorTime:
+    case Covariate::kRightMotorTime:
+    case Covariate::kDrivenTime:
+    case Covariate::kPreviousLasted:
+    case Covariate::kSinceRest:
+    case Covariate::kMotorTimeDifference:
+    case Covariate::kMotorTimeSum:
+    case Covariate::kTraffic: return "s";
+    case Covariate::kX:
+    case Covariate::kY:
+    case Covariate::kRadius:
+    case Covariate::kNearest:
+    case Covariate::kPointDistance: return "mm";
+    case Covariate::kHeading:
+    case Covariate::kBearing: return "rad";
+    default: return "";
+  }
+}
+
 double reach_mm(const Axis& axis) { return axis.within_mm > 0 ? axis.within_mm : kNeighbourRadii_mm[axis.radius]; }
 
 double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {

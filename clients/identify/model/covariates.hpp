@@ -87,6 +87,10 @@ enum class Covariate : std::uint8_t {
   kPointDistance,  ///< distance from Axis::point, less its growth
 };
 
+/// Name as in model files (Function.Covariate in idl/effects.proto), in lower case; and the unit of its values, empty: a number or a key.
+[[nodiscard]] const char* name_of(Covariate);
+[[nodiscard]] const char* unit_of(Covariate);
+
 /// The centre of circles that move and grow; see MovingPoint in idl/effects.proto.
 struct MovingPoint {
   double x_mm = 0, y_mm = 0;  ///< at the start of the run

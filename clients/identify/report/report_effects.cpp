@@ -74,6 +74,14 @@ std::optional<double> log10_p_of(const identification::Evidence& evidence) {
   return known(evidence.has_log10_p(), evidence.log10_p());
 }
 
+/// "41.2 mm (39.8 to 42.6, 95 %)".
+std::string with_interval(const identification::Estimate& number) {
+  const auto end = [](bool has, double value, const char* none) { return has ? figure(value) : std::string(none); };
+  return fmt::format("{}{}{} ({} to {}, 95 %)", figure(number.value()), number.unit().empty() ? "" : " ",
+                     number.unit(), end(number.has_low(), number.low(), "not bounded"),
+                     end(number.has_high(), number.high(), "not bounded"));
+}
+
 Data facts_of(const Effect& effect) {
   Data list{Data::type::list};
   const auto fact = [&](const std::string& name, const std::string& value) {
@@ -83,6 +91,10 @@ Data facts_of(const Effect& effect) {
     list << one;
   };
   fact("acts on", acts_on_in_words(effect.acts_on()));
+  // Amplitudes of many robots would hide the rest. They are in the result.
+  constexpr int kMostNumbers = 12;
+  for (int i = 0; i < std::min(effect.numbers_size(), kMostNumbers); ++i)
+    fact(effect.numbers(i).name(), with_interval(effect.numbers(i)));
   if (effect.has_facts()) {
     const std::map<std::string, google::protobuf::Value> given(effect.facts().fields().begin(),
                                                                effect.facts().fields().end());

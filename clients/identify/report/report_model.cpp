@@ -71,6 +71,9 @@ Section model_section(const Identification& found) {
           if (!result.has_noise_low()) return std::string();
           return interval_in_words(number_of(result.noise_low(), field), number_of(result.noise_high(), field));
         }));
+  add("Walls", facts_of(result.walls(), [&](const FieldDescriptor& field) {
+        return interval_in_words(number_of(result.walls_low(), field), number_of(result.walls_high(), field));
+      }));
   add("Data", facts_of(found.set(), [](const FieldDescriptor&) { return ""; }));
   if (tables.is_empty_list()) return std::nullopt;
   Data section{Data::type::object};

@@ -438,7 +438,10 @@ Effect travelling_waves(double strength) {
             const double phase = 2 * kPi * ((0.8 * at.disc.x + 0.6 * at.disc.y) / 420 - at.time_s / 70);
             slow_both(push, 1 - 0.5 * strength * std::max(0.0, std::sin(phase)));
           },
-          {}};
+          {},
+          {},
+          false,
+          {{"wavelength", 420}, {"phase speed", 6}}};
 }
 
 Effect weak_right(double strength) {

@@ -189,7 +189,10 @@ Effect moving_shadow() {
             const double x = -300 + 3.4 * at.time_s, y = -150 + 1.7 * at.time_s;
             slow_both(push, 1 - 0.45 / (1 + std::pow(distance(at.disc, x, y) / 130, 8)));
           },
-          {}};
+          {},
+          {},
+          false,
+          {{"centre x", -300}, {"centre y", -150}, {"velocity x", 3.4}, {"velocity y", 1.7}}};
 }
 
 Effect growing_puddle() {
@@ -200,7 +203,10 @@ Effect growing_puddle() {
           [](const Situation& at, Push& push) {
             if (distance(at.disc, -50, 60) < 40 + 1.6 * at.time_s) slow_both(push, 0.55);
           },
-          {}};
+          {},
+          {},
+          false,
+          {{"centre x", -50}, {"centre y", 60}, {"growth", 1.6}}};
 }
 
 Effect patch_of_some_more() {
@@ -231,7 +237,10 @@ Effect replaced_robots() {
               push.offset_mm_s.right -= right ? 2.4 : 0;
             }
           },
-          {}};
+          {},
+          {},
+          false,
+          {{"instant", 70}}};
 }
 
 Effect driving_crowd() {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -79,6 +80,8 @@ struct Effect {
   std::function<double(const Situation&)> noise = {};
   /// Chance events, which no predictor can know: the oracle does without them, and no finding has to name them.
   bool by_chance = false;
+  /// True values of numbers that the result gives by these names (Effect.numbers in idl/identification.proto): centres, instants.
+  std::map<std::string, double> numbers = {};
 };
 
 /// A fault of the data.
