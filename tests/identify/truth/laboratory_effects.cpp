@@ -262,6 +262,24 @@ Effect slow_leader() {
           {}};
 }
 
+Effect crowd_noise() {
+  return {"crowd-noise",
+          "speeds vary with 1 + 2.5 k / (k + 1) of the standard deviation, k = sum of (60 mm / d)^4 over robots at "
+          "d < 250 mm",
+          {{"neighbours"}},
+          {"robot", "time", "position"},
+          {},
+          {},
+          [](const Situation& at) {
+            double k = 0;
+            for (const Vec& other : *at.discs) {
+              const double d = distance(at.disc, other.x, other.y);
+              if (d > 1 && d < 250) k += square(square(60 / d));
+            }
+            return 1 + 2.5 * k / (k + 1);
+          }};
+}
+
 Effect bent_headings() {
   return {"bent-headings",
           "measured headings are off by 0.35 rad sin(2 pi (x + 60 mm) / 700 mm) cos(2 pi y / 900 mm)",

@@ -31,6 +31,7 @@ Effect patch_of_some_more();  // a patch that slows each robot by another amount
 Effect replaced_robots();     // two robots are replaced during each run
 Effect driving_crowd();       // robots are slow among others that drive
 Effect slow_leader();         // robots near robot 0 are slow
+Effect crowd_noise();         // wheels vary more among other robots
 
 // Measurement.
 Effect bent_headings();  // measured headings are off, by place

@@ -188,6 +188,8 @@ const Entry kEntries[] = {
     {"gusts-blind", "the same, with one frame a second and no headings",
      [] { return with(sparse_lab(), Effects{gusts()}); }},
     {"rising-noise", "noise: speeds vary more and more", [] { return with(tidy_lab(), Effects{rising_noise()}); }},
+    {"crowd-noise", "noise: speeds vary more near other robots",
+     [] { return with(tidy_lab(), Effects{crowd_noise()}); }},
     {"bowl", "world_frame and position: the floor sags", [] { return with(poor_lab(), Effects{bowl()}); }},
     {"drawing-walls", "world_frame and position: robots are drawn to two walls",
      [] {
