@@ -245,6 +245,16 @@ const Entry kEntries[] = {
      }},
     {"stalls", "no effect that can be known: motors stall at random",
      [] { return with(tidy_lab(), Effects{stalls()}); }},
+    {"rare-stalls", "motors stall at random, once a minute, with rare long spells",
+     [] { return with(tidy_lab(), Effects{rare_spells({})}); }},
+    {"rare-slips", "the same, one frame a second and no headings: wheels slip to 40 % of their speed",
+     [] {
+       return with(sparse_lab(), Effects{rare_spells({45, 9, 3, 0.4})});
+     }},
+    {"stalls-battery", "time, and motors that stall at random",
+     [] {
+       return with(blind_lab(), Effects{rare_spells({}), battery_by_the_clock()});
+     }},
     {"stalls-patch", "position, and motors that stall at random",
      [] {
        return with(tidy_lab(), Effects{stalls(), slow_patch()});
@@ -270,6 +280,8 @@ const Entry kEntries[] = {
        s.coarse = 0.04;
        return s;
      }},
+    {"nothing-heavy", "no effect, noise with a heavy tail",
+     [] { return with(tidy_lab(), Effects{heavy_tailed_noise()}); }},
     // Faults of the data.
     {"swapped", "robots 3 and 9 exchange their numbers in run 1",
      [] {
