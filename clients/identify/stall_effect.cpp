@@ -140,7 +140,7 @@ double fitted_speed(const SpellScan& scan, const MotionModel& model, Stalls stal
 
 /// Refits everything beside the spells.
 SpellScan::Found refit(const SpellScan& scan, const Fitter& fitter, SpellScan::Found found, FitState& state) {
-  constexpr int kRounds = 3;
+  constexpr int kRounds = 2;
   for (int round = 0; round < kRounds; ++round) {
     std::vector<std::vector<float>> shares;
     for (TrackSpells& track : found.tracks) shares.push_back(std::move(track.share));
