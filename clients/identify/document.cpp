@@ -499,6 +499,7 @@ identification::Result result_of(const Findings& f, const MeasuredSet& judged, d
   identification::Result out;
   add_errors(out, f, horizon_s);
   *out.mutable_effects() = effects_of(f);
+  if (f.stalls) *out.add_effects() = entry_of(*f.stalls);
   for (const NoiseEffect& effect : f.noise_effects) *out.add_effects() = entry_of(effect);
   if (const double lag_s = after.base.command_lag_s; lag_s != 0) {
     out.mutable_command_lag()->set_lag_s(lag_s);

@@ -17,6 +17,7 @@
 #include "clients/identify/predict/evaluation.hpp"
 #include "clients/identify/predict/held_out_gain.hpp"
 #include "clients/identify/search/search.hpp"
+#include "clients/identify/stall_effect.hpp"
 #include "clients/identify/unexplained/unexplained.hpp"
 
 namespace kilotwin::identify {
@@ -62,6 +63,7 @@ struct Findings {
   std::optional<std::pair<double, double>> command_lag_s;
   std::map<std::uint32_t, NoiseRatio> noise_ratios;  ///< by robot
   std::vector<NoiseEffect> noise_effects;
+  std::optional<StallEffect> stalls;
   std::string model_file;  ///< where the model will stand
 };
 

@@ -190,6 +190,12 @@ void choose(Findings& f, const Fitter& fitter, const MeasuredSet& train, const M
   if (f.found.fit.model.terms.empty() && f.found.fit.model.base.command_lag_s == 0) f.base = f.found.fit;
 }
 
+/// Stalls, and the noise beside them.
+void add_stalls(Findings& f, const Fitter& fitter) {
+  f.stalls = find_stalls(fitter, f.found.fit);
+  if (f.stalls) set_noise(f, fitter);
+}
+
 /// The errors that are reported.
 void judge(Findings& f, const Fitter& fitter, const Evaluation& evaluation, const ForecastTimes& reported) {
   f.before = evaluation.judge(f.base, reported);
@@ -197,6 +203,7 @@ void judge(Findings& f, const Fitter& fitter, const Evaluation& evaluation, cons
   // A model that diverges gives no prediction for some rows.
   if (f.after.forecasts.size() != f.before.forecasts.size()) {
     keep_base_model(f);
+    f.stalls.reset();
     set_noise(f, fitter);
     f.base = f.found.fit;
     f.after = f.before = evaluation.judge(f.base, reported);
@@ -243,6 +250,7 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   for (Run& run : all_fitted.runs)
     for (Track& track : run.tracks) track.held_out = track.chooses = false;
   choose(f, fitter, train, test != nullptr ? all_fitted : train, evaluation, reported);
+  if (options.find_effects) add_stalls(f, fitter);
   begin(kErrors, "prediction errors");
   judge(f, fitter, evaluation, reported);
   begin(kUnexplained, "what is left unexplained");

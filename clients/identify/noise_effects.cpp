@@ -6,7 +6,6 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -14,13 +13,15 @@
 #include <utility>
 
 #include "clients/identify/model/effect_records.hpp"
+#include "clients/identify/noise_forms.hpp"
 #include "clients/identify/result/values.hpp"
 #include "core/stats/distributions.hpp"
 
 namespace kilotwin::identify {
 namespace {
 
-/// Three candidates at 0.003 together, and a margin for innovations that are not normal.
+/// Of a candidate of one form. Four candidates at 0.003 together, and a margin for innovations that are not normal. Candidates of
+/// several forms pay for the choice.
 constexpr double kThreshold_log10_p = -5;
 /// Least cross-validated gain, nat and in standard errors.
 constexpr double kLeastGain = 10, kLeastErrors = 3;
@@ -30,135 +31,7 @@ constexpr double kLeastRatio = 1.3;
 constexpr double kPrior_sd = 1;
 constexpr std::size_t kFewestSamples = 400;
 
-/// Columns of the log variance over one covariate.
-struct NoiseForm {
-  std::string name;
-  std::vector<std::string> covariates;
-  Eigen::MatrixXd columns;         ///< samples x columns
-  std::vector<std::size_t> folds;  ///< of each sample; below kFolds
-  /// The factor of the standard deviation as a function of the model file. `level`: the log variance that all samples share, beside
-  /// the coefficients.
-  std::function<proto::Function(const Eigen::VectorXd& coefficients, double level)> scale;
-};
-constexpr std::size_t kFolds = 6;
-
 using Samples = std::vector<NoiseSample>;
-
-std::size_t stretch_of(const NoiseSample& sample) {
-  return static_cast<std::size_t>(std::max(0.0, sample.time_s) / kNoiseStretch_s);
-}
-
-std::vector<std::size_t> folds_by_robot(const Samples& samples) {
-  std::map<std::uint32_t, std::size_t> number;
-  for (const NoiseSample& sample : samples) number.emplace(sample.robot, 0);
-  std::size_t next = 0;
-  for (auto& [robot, at] : number) at = next++ % kFolds;
-  std::vector<std::size_t> folds;
-  for (const NoiseSample& sample : samples) folds.push_back(number[sample.robot]);
-  return folds;
-}
-
-NoiseForm of_robots(const Samples& samples) {
-  NoiseForm out{"noise-by-robot", {"robot"}, {}, {}, {}};
-  std::map<std::uint32_t, Eigen::Index> column;
-  for (const NoiseSample& sample : samples) column.emplace(sample.robot, 0);
-  Eigen::Index next = 0;
-  std::vector<std::uint32_t> robots;
-  for (auto& [robot, at] : column) {
-    at = next++;
-    robots.push_back(robot);
-  }
-  out.columns = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(samples.size()), next);
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    out.columns(static_cast<Eigen::Index>(i), column[samples[i].robot]) = 1;
-    out.folds.push_back((stretch_of(samples[i]) + samples[i].track) % kFolds);
-  }
-  out.scale = [robots](const Eigen::VectorXd& coefficients, double level) {
-    proto::Function f;
-    f.set_of(proto::Function::ROBOT);
-    f.mutable_table()->set_otherwise(rounded(std::exp(0.5 * level)));
-    for (std::size_t r = 0; r < robots.size(); ++r) {
-      f.mutable_table()->add_key(robots[r]);
-      f.mutable_table()->add_value(rounded(std::exp(0.5 * (level + coefficients[static_cast<Eigen::Index>(r)]))));
-    }
-    return f;
-  };
-  return out;
-}
-
-/// The range of a coordinate.
-template <class Of> std::pair<double, double> range_of(const Samples& samples, Of&& of) {
-  const auto [low, high] = std::minmax_element(samples.begin(), samples.end(),
-                                               [&](const auto& a, const auto& b) { return of(a) < of(b); });
-  return {of(*low), std::max(of(*high), of(*low) + 1e-9)};
-}
-
-/// cos(k pi u) at the share u of a range.
-double cosine(int k, double value, std::pair<double, double> range) {
-  return std::cos(k * M_PI * std::clamp((value - range.first) / (range.second - range.first), 0.0, 1.0));
-}
-
-constexpr int kTimeOrder = 4, kPlaceOrder = 3;
-
-NoiseForm of_time(const Samples& samples) {
-  NoiseForm out{"noise-by-time", {"time"}, {}, folds_by_robot(samples), {}};
-  const auto range = range_of(samples, [](const NoiseSample& s) { return s.time_s; });
-  const auto row = [range](double time_s) {
-    Eigen::RowVectorXd r(kTimeOrder + 1);
-    for (int k = 0; k <= kTimeOrder; ++k) r[k] = cosine(k, time_s, range);
-    return r;
-  };
-  out.columns.resize(static_cast<Eigen::Index>(samples.size()), kTimeOrder + 1);
-  for (std::size_t i = 0; i < samples.size(); ++i)
-    out.columns.row(static_cast<Eigen::Index>(i)) = row(samples[i].time_s);
-  out.scale = [row, range](const Eigen::VectorXd& coefficients, double level) {
-    constexpr int kKnots = 25;
-    proto::Function f;
-    f.set_of(proto::Function::TIME);
-    for (int i = 0; i < kKnots; ++i) {
-      const double time_s = range.first + (range.second - range.first) * i / (kKnots - 1);
-      f.mutable_spline()->add_knot(rounded(time_s));
-      f.mutable_spline()->add_value(rounded(std::exp(0.5 * (level + row(time_s).dot(coefficients)))));
-    }
-    return f;
-  };
-  return out;
-}
-
-NoiseForm of_place(const Samples& samples) {
-  NoiseForm out{"noise-by-place", {"position"}, {}, folds_by_robot(samples), {}};
-  const auto xs = range_of(samples, [](const NoiseSample& s) { return s.x_mm; });
-  const auto ys = range_of(samples, [](const NoiseSample& s) { return s.y_mm; });
-  const auto row = [xs, ys](double x_mm, double y_mm) {
-    std::vector<double> values;
-    for (int j = 0; j <= kPlaceOrder; ++j)
-      for (int k = 0; j + k <= kPlaceOrder; ++k) values.push_back(cosine(j, x_mm, xs) * cosine(k, y_mm, ys));
-    return Eigen::RowVectorXd(
-        Eigen::Map<const Eigen::RowVectorXd>(values.data(), static_cast<Eigen::Index>(values.size())));
-  };
-  out.columns.resize(static_cast<Eigen::Index>(samples.size()), row(0, 0).size());
-  for (std::size_t i = 0; i < samples.size(); ++i)
-    out.columns.row(static_cast<Eigen::Index>(i)) = row(samples[i].x_mm, samples[i].y_mm);
-  out.scale = [row, xs, ys](const Eigen::VectorXd& coefficients, double level) {
-    constexpr int kKnots = 13;
-    proto::Function f;
-    f.set_of(proto::Function::X);
-    f.set_and_of(proto::Function::Y);
-    const auto knot = [](std::pair<double, double> range, int i) {
-      return range.first + (range.second - range.first) * i / (kKnots - 1);
-    };
-    for (int i = 0; i < kKnots; ++i) {
-      f.mutable_spline_2d()->add_knot(rounded(knot(xs, i)));
-      f.mutable_spline_2d()->add_and_knot(rounded(knot(ys, i)));
-    }
-    for (int j = 0; j < kKnots; ++j)
-      for (int i = 0; i < kKnots; ++i)
-        f.mutable_spline_2d()->add_value(
-            rounded(std::exp(0.5 * (level + row(knot(xs, i), knot(ys, j)).dot(coefficients)))));
-    return f;
-  };
-  return out;
-}
 
 /// Log variances by the effects accepted so far and by one candidate.
 class VarianceFit {
@@ -262,7 +135,7 @@ std::pair<double, double> cross_validated(const VarianceFit& fit, const NoiseFor
                                           const Samples& samples) {
   std::map<std::pair<std::size_t, std::size_t>, double> stretches;
   double sum = 0;
-  for (std::size_t fold = 0; fold < kFolds; ++fold) {
+  for (std::size_t fold = 0; fold < NoiseForm::kFolds; ++fold) {
     const Eigen::VectorXd beta =
         fit.coefficients(candidate.columns, [&](std::size_t i) { return candidate.folds[i] != fold; });
     for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -279,13 +152,15 @@ std::pair<double, double> cross_validated(const VarianceFit& fit, const NoiseFor
 }
 
 /// The candidate as an effect, if it passes.
-std::optional<NoiseEffect> accepted(const VarianceFit& fit, const NoiseForm& candidate, const Samples& samples,
-                                    Eigen::VectorXd& log_scale) {
+std::optional<NoiseEffect> accepted(const VarianceFit& fit, const NoiseForm& candidate, double threshold_log10_p,
+                                    const Samples& samples, Eigen::VectorXd& log_scale) {
   NoiseEffect out;
   out.name = candidate.name;
   out.covariates = candidate.covariates;
+  out.depends_on = candidate.in_words;
+  out.threshold_log10_p = threshold_log10_p;
   out.log10_p = fit.log10_p(candidate.columns, out.degrees);
-  if (!(out.log10_p < kThreshold_log10_p)) return std::nullopt;
+  if (!(out.log10_p < threshold_log10_p)) return std::nullopt;
   std::tie(out.held_out, out.held_out_se) = cross_validated(fit, candidate, samples);
   if (!(out.held_out > kLeastGain && out.held_out > kLeastErrors * out.held_out_se)) return std::nullopt;
   const Eigen::VectorXd beta = fit.coefficients(candidate.columns, [](std::size_t) { return true; });
@@ -313,25 +188,26 @@ std::vector<NoiseEffect> find_noise_effects(const std::vector<NoiseSample>& all)
     if (!sample.held_out && sample.process.trace() > 0) samples.push_back(sample);
   std::vector<NoiseEffect> found;
   if (samples.size() < kFewestSamples) return found;
-  std::vector<NoiseForm> candidates;
-  for (const auto& make : {of_robots, of_time, of_place}) candidates.push_back(make(samples));
+  std::vector<NoiseForm> candidates = noise_forms(samples);
+  std::map<std::string, double> threshold_log10_p;
+  for (const NoiseForm& form : candidates) threshold_log10_p[form.name] += 1;
+  for (auto& [name, forms] : threshold_log10_p) forms = kThreshold_log10_p - std::log10(forms);
   Eigen::VectorXd given = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(samples.size()));
   while (!candidates.empty()) {
     const VarianceFit fit(samples, given);
     std::optional<NoiseEffect> best;
     Eigen::VectorXd best_scale, scale;
-    std::size_t place = 0;
     for (std::size_t c = 0; c < candidates.size(); ++c) {
-      std::optional<NoiseEffect> one = accepted(fit, candidates[c], samples, scale);
+      std::optional<NoiseEffect> one =
+          accepted(fit, candidates[c], threshold_log10_p[candidates[c].name], samples, scale);
       if (!one || (best && one->held_out <= best->held_out)) continue;
       best = std::move(one);
       best_scale = scale;
-      place = c;
     }
     if (!best) break;
-    found.push_back(std::move(*best));
     given += best_scale;
-    candidates.erase(candidates.begin() + static_cast<std::ptrdiff_t>(place));
+    std::erase_if(candidates, [&](const NoiseForm& form) { return form.name == best->name; });
+    found.push_back(std::move(*best));
   }
   return found;
 }
@@ -356,7 +232,7 @@ identification::Effect entry_of(const NoiseEffect& found) {
   out.set_acts_on("NOISE");
   identification::Evidence& evidence = *out.mutable_evidence();
   evidence.set_log10_p(found.log10_p);
-  evidence.set_threshold_log10_p(kThreshold_log10_p);
+  evidence.set_threshold_log10_p(found.threshold_log10_p);
   evidence.set_log_likelihood_gain(found.gain);
   *evidence.mutable_held_out_gain() = json_value(found.held_out);
   *evidence.mutable_held_out_gain_se() = json_value(found.held_out_se);
@@ -369,7 +245,7 @@ identification::Effect entry_of(const NoiseEffect& found) {
   *out.mutable_share_removed() = json_null();
   out.set_in_words(fmt::format(
       "the size of the motion noise depends on {}: its standard deviation is {:.2f} to {:.2f} times the common one",
-      found.covariates.front() == "position" ? "place" : found.covariates.front(), found.least, found.most));
+      found.depends_on, found.least, found.most));
   return out;
 }
 

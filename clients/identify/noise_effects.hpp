@@ -1,4 +1,4 @@
-/// Effects on the process noise: its size may depend on the robot, on the place, or on time. They act on no mean, so the search
+/// Effects on the process noise: its size may depend on the robot, on the place, on time, or on neighbours. They act on no mean, so the search
 /// for terms cannot find them. Data: squared innovations after the search (fit/noise_samples.hpp).
 #pragma once
 
@@ -16,7 +16,9 @@ namespace kilotwin::identify {
 struct NoiseEffect {
   std::string name;
   std::vector<std::string> covariates;
-  double log10_p = 0;  ///< of the score test
+  std::string depends_on;  ///< in words
+  double log10_p = 0;      ///< of the score test
+  double threshold_log10_p = 0;
   std::uint32_t degrees = 0;
   double gain = 0;                       ///< of the fit, nat, over its overdispersion
   double held_out = 0, held_out_se = 0;  ///< cross-validated log score, nat, and its standard error over stretches

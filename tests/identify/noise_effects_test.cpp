@@ -13,6 +13,7 @@
 #include "clients/identify/search/hypotheses.hpp"
 #include "tests/identify/small_set.hpp"
 #include "tests/identify/truth/effects.hpp"
+#include "tests/identify/truth/laboratory_effects.hpp"
 
 namespace kilotwin {
 namespace {
@@ -99,9 +100,31 @@ TEST(NoiseEffects, ARoughPatchIsAnEffectOfPlace) {
   EXPECT_LT(far / places, 1.15);
 }
 
+TEST(NoiseEffects, ACrowdIsAnEffectOfNeighbours) {
+  truth::Scene scene = small({truth::crowd_noise()});
+  scene.width_mm = scene.height_mm = 450;
+  scene.train_runs = 4;
+  const Fitted f(scene);
+  const std::vector<NoiseEffect> found = find_noise_effects(f.samples);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].name, "noise-by-neighbours");
+  EXPECT_EQ(found[0].covariates, std::vector<std::string>{"neighbours"});
+  const proto::Function& scale = found[0].scale;
+  EXPECT_GT(scale.radius_mm(), 0);
+  // One robot at 45 mm multiplies the true standard deviation by 2.9, no robot within 250 mm by 1.
+  const proto::Spline& curve = scale.spline();
+  const double first = curve.value(0), last = curve.value(curve.value_size() - 1);
+  EXPECT_GT(scale.of() == proto::Function::NEAREST ? first / last : last / first, 1.7);
+  proto::Model model = proto_of(f.state.model);
+  write_noise_effects(model, f.state.model.noise, found);
+  ASSERT_NE(record(model, "wheel-noise"), nullptr);
+  EXPECT_EQ(record(model, "wheel-noise")->function(1).ShortDebugString(), scale.ShortDebugString());
+}
+
 TEST(NoiseEffects, EqualNoiseHasNone) {
-  for (const std::uint64_t seed : {5u, 6u}) {
+  for (const std::uint64_t seed : {5u, 6u, 7u, 8u}) {
     truth::Scene scene = small({});
+    if (seed > 6) scene.width_mm = scene.height_mm = 450;  // crowded
     const MeasuredSet set = set_of(scene, played(scene, seed));
     const Fitter fitter(set, 2);
     FitState state(set);

@@ -126,8 +126,9 @@ TEST(Truth, EveryCovariateOfTheContractHasAScene) {
     }
   }
   const std::set<std::string> contract = {
-      "time",        "position",    "heading", "command", "time_since_command", "motor_time", "neighbours",
-      "world_frame", "measurement", "robot",   "history"};
+      "time",       "position",   "heading",     "command",     "time_since_command",
+      "motor_time", "neighbours", "world_frame", "measurement", "robot",
+      "history",    "episodes"};
   EXPECT_EQ(named, contract);
 }
 

@@ -120,7 +120,7 @@ void judge_causes(const Scene& scene, const json& result, Verdict& verdict) {
   }
   verdict.causes = static_cast<int>(scene.effects.size() + scene.faults.size());
   for (std::size_t k = 0; k < named.size(); ++k) {
-    if (scene.effects[k].by_chance)
+    if (scene.effects[k].by_chance && scene.effects[k].named_by.empty())
       --verdict.causes;
     else if (named[k])
       ++verdict.named;

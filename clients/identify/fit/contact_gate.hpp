@@ -10,13 +10,14 @@
 namespace kilotwin::identify {
 
 /// A robot in contact with another robot is slowed and displaced, but its heading still follows its wheels, within
-/// the contact noise: the fit uses the heading alone. Contacts with walls last long, and the fit uses nothing.
+/// the contact noise: the fit uses the heading alone. Contacts with walls last long, and the fit uses nothing. The same holds where a
+/// spell of stalls starts or ends.
 class ContactGate {
  public:
   enum class Counts : std::uint8_t { kAll, kHeading, kNothing };
 
   void step(const StepRecord& record) {
-    wall_ = wall_ || record.at_wall;
+    wall_ = wall_ || record.at_wall || record.spell_unsure;
     robot_ = robot_ || record.at_robot;
   }
   /// To be called once per measurement.

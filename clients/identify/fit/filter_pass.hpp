@@ -43,6 +43,8 @@ struct TrackView {
   const RunNeighbours* neighbours = nullptr;
   const CommandClock* clock = nullptr;
   const std::vector<bool>* at_boundary = nullptr;  ///< whether each sample is at the boundary of visited places
+  /// Share of the interval before each sample in a spell of MotionModel::stalls; null: unknown.
+  const std::vector<float>* spells = nullptr;
   double start_heading_rad = 0, start_heading_sd_rad = 0;  ///< at the first sample, as last estimated
   std::atomic<std::uint64_t>* work = nullptr;              ///< counts work; null: nobody counts
 
@@ -57,6 +59,12 @@ struct TrackView {
   }
 };
 
+/// Tells the filter the share of an interval in a spell. Where it is unsure, the interval gives no samples.
+inline void tell_spell(TrackFilter& filter, double share, double length_s) {
+  constexpr double kUnsure = 0.02;
+  filter.in_spell(share, share * (1 - share) * length_s, share > kUnsure && share < 1 - kUnsure);
+}
+
 /// Runs the filter from the first sample to the last. Calls visitor.start(filter), visitor.step(record) and
 /// visitor.update(innovation, sample).
 template <class Visitor>
@@ -67,6 +75,7 @@ void run_filter(TrackFilter& filter, const TrackView& view, std::size_t samples,
   std::uint64_t steps = 0;
   for (std::size_t i = 1; i < std::min(samples, all.size()); ++i) {
     filter.at_boundary((*view.at_boundary)[i - 1] || (*view.at_boundary)[i]);
+    if (view.spells != nullptr) tell_spell(filter, (*view.spells)[i], all[i].time_s - all[i - 1].time_s);
     sub_steps(*view.clock, all[i - 1].time_s, all[i].time_s, [&](double t, double h, const CommandState& commands) {
       visitor.step(filter.step(t, h, commands, view.neighbours->view(view.place, t + h / 2)));
       ++steps;

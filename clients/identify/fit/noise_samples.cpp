@@ -41,6 +41,7 @@ class ProcessRecorder {
     one.time_s = sample.time_s;
     one.x_mm = last_.x_mm;
     one.y_mm = last_.y_mm;
+    one.at = last_;
     one.size = innovation.size;
     one.difference = innovation.difference;
     one.covariance = innovation.covariance;

@@ -16,7 +16,8 @@ struct NoiseSample {
   std::size_t track = 0;  ///< index in PreparedSet::views()
   bool held_out = false;
   double time_s = 0, x_mm = 0, y_mm = 0;
-  int size = 0;                                          ///< 2, or 3 with the heading
+  Situation at;  ///< in the last sub-step before; its neighbours point into the tracks
+  int size = 0;  ///< 2, or 3 with the heading
   Eigen::Vector3d difference = Eigen::Vector3d::Zero();  ///< the innovation
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of it, by the model
   Eigen::Matrix3d process =

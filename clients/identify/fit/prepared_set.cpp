@@ -59,6 +59,12 @@ void PreparedSet::set_command_lag(double lag_s) {
   }
 }
 
+void PreparedSet::set_spells(std::vector<std::vector<float>> spells) {
+  spells_ = std::make_shared<const std::vector<std::vector<float>>>(std::move(spells));
+  for (std::size_t v = 0; v < views_.size(); ++v)
+    views_[v].spells = (*spells_)[v].empty() ? nullptr : &(*spells_)[v];
+}
+
 void PreparedSet::set_neighbours(std::size_t run, RunNeighbours neighbours) {
   neighbours_[run] = std::make_shared<const RunNeighbours>(std::move(neighbours));
   for (TrackView& view : views_)

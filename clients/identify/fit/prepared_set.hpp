@@ -59,6 +59,8 @@ class PreparedSet {
   void find_centres(const MotionModel&, std::uint32_t threads);
   /// Estimates the initial heading of each track: the measured one, or the most likely of many hypotheses.
   void find_headings(const MotionModel&, std::uint32_t threads);
+  /// By view: TrackView::spells; an empty vector stands for unknown.
+  void set_spells(std::vector<std::vector<float>>);
   /// Computes the traffic grids with the model's cells.
   void update_traffic(const MotionModel&);
 
@@ -71,6 +73,7 @@ class PreparedSet {
   /// By view; constant.
   std::shared_ptr<const std::vector<CommandClock>> clocks_;
   std::shared_ptr<const std::vector<std::vector<bool>>> at_boundary_;
+  std::shared_ptr<const std::vector<std::vector<float>>> spells_;
   /// By run; what they point to is constant.
   std::vector<std::shared_ptr<const RunNeighbours>> neighbours_;
   std::vector<TrackView> views_;

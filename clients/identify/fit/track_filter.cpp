@@ -15,6 +15,9 @@ constexpr double kGate2 = 23, kGate3 = 25.9;
 /// Number of consecutive far outliers after which the track counts as lost.
 constexpr int kLostAfter = 4;
 constexpr double kFar = 60;
+/// Time over which an unknown share in spells is taken as constant: about that between samples. Over a horizon, where a share may last
+/// for longer, only rollouts give the distribution.
+constexpr double kSpellKept_s = 0.5;
 
 }  // namespace
 
@@ -44,6 +47,28 @@ TrackFilter::TrackFilter(const MotionModel& model, const RobotBias& bias, std::u
   belief_.covariance.bottomRightCorner<2, 2>() = bias.covariance;
   place_.robot = robot;
   place_.run = run;
+  if (!model.stalls) return;
+  spell_share_ = model.stalls->share();
+  spell_variance_s_ = model.stalls->variance_s(kSpellKept_s);
+}
+
+void TrackFilter::begin_forecast() {
+  if (model_->stalls && !forecasting_)
+    in_spell(model_->stalls->share(), model_->stalls->variance_s(kSpellKept_s), false);
+  forecasting_ = true;
+}
+
+/// A spell changes the speeds of the wheels by the motors, in proportion.
+void TrackFilter::apply_spells(StepRecord& record) const {
+  Rates& rates = record.rates;
+  const double by = model_->stalls->gain - 1, change = by * spell_share_;
+  const Eigen::Vector2d driven = rates.driven_mm_s();
+  rates.left_mm_s += change * driven[0];
+  rates.right_mm_s += change * driven[1];
+  rates.left_gain *= 1 + change;
+  rates.right_gain *= 1 + change;
+  record.spell_noise = by * std::sqrt(spell_variance_s_) * driven;
+  record.spell_unsure = spell_unsure_;
 }
 
 void TrackFilter::start(const Sample& sample, const Situation&, double heading_rad, double heading_sd_rad) {
@@ -117,6 +142,7 @@ StepRecord TrackFilter::step_freely(double time_s, double h_s, const CommandStat
   record.at_wall = commands.driven() &&
                    (at_boundary_ || model_->walls.at_wall(record.middle.x_mm, record.middle.y_mm, kWallMargin_mm));
   record.rates = model_->rates(record.middle, belief_.mean.tail<2>());
+  if (model_->stalls && commands.driven()) apply_spells(record);
   record.arc = arc_of(record.rates, model_->base.wheel_base_mm, belief_.mean[2], h_s);
   propagate_covariance(record);
   belief_.mean[0] += record.arc.dx_mm;
@@ -192,6 +218,10 @@ void TrackFilter::propagate_covariance(const StepRecord& record) {
     const Eigen::Vector2d wheels =
         h * (noise.factor_s * record.rates.driven_mm_s().cwiseAbs2().array() + noise.wheel_mm2_s);
     p.topLeftCorner<3, 3>() += by_wheel * wheels.asDiagonal() * by_wheel.transpose();
+    if (model_->stalls) {
+      const Eigen::Vector3d lost = by_wheel * record.spell_noise;
+      p.topLeftCorner<3, 3>() += h * lost * lost.transpose();
+    }
   }
   if (!forecasting_) {
     if (record.at_wall) own += h * Eigen::Vector3d(noise.wall_mm2_s, noise.wall_mm2_s, noise.wall_rad2_s);

@@ -33,7 +33,11 @@ struct StepRecord {
   Arc arc;
   double h_s = 0;
   bool at_wall = false, at_robot = false;  ///< whether it may have been in contact
-  [[nodiscard]] bool in_contact() const { return at_wall || at_robot; }
+  bool spell_unsure = false;  ///< whether the share of a spell in it is uncertain (TrackFilter::in_spell)
+  /// Standard deviation of the wheels' common motion by an unknown share in spells, mm/s^0.5.
+  Eigen::Vector2d spell_noise = Eigen::Vector2d::Zero();
+  /// Whether other causes than wheels may have acted.
+  [[nodiscard]] bool in_contact() const { return at_wall || at_robot || spell_unsure; }
 };
 
 /// Jacobian of the pose at the end of a sub-step by the initial heading and by the paths of the wheels.
@@ -77,9 +81,16 @@ class TrackFilter {
   /// forecasts.
   void step_mean(double time_s, double h_s, const CommandState& commands, const NeighbourView& near);
   /// Starts a forecast: no further measurements, and no contact noise. The caller handles contacts.
-  void begin_forecast() { forecasting_ = true; }
+  void begin_forecast();
   /// For the next steps: whether the robot is at the boundary of visited places.
   void at_boundary(bool at_boundary) { at_boundary_ = at_boundary && model_->walls_uncertain; }
+  /// For the next steps: share of their time in a spell of MotionModel::stalls, with the variance of this share times the time over
+  /// which it is constant, s. `unsure`: the motion gives no samples. Without a call, both numbers are those of a random instant.
+  void in_spell(double share, double variance_s, bool unsure) {
+    spell_share_ = share;
+    spell_variance_s_ = variance_s;
+    spell_unsure_ = unsure;
+  }
   Innovation update(const Sample&, const CommandState& commands);
 
   [[nodiscard]] const Belief& belief() const { return belief_; }
@@ -98,6 +109,7 @@ class TrackFilter {
   [[nodiscard]] Situation situation(double time_s, const Eigen::Vector3d& pose, const CommandState&,
                                     const NeighbourView&) const;
   [[nodiscard]] Eigen::Matrix3d jacobian(const Situation&) const;
+  void apply_spells(StepRecord&) const;
   void propagate_covariance(const StepRecord&);
 
   const MotionModel* model_;
@@ -107,6 +119,8 @@ class TrackFilter {
   bool measures_;
   bool forecasting_ = false;
   bool at_boundary_ = false;
+  double spell_share_ = 0, spell_variance_s_ = 0;
+  bool spell_unsure_ = false;
 };
 
 }  // namespace kilotwin::identify

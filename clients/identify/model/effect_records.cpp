@@ -394,6 +394,14 @@ Effect turned_position(const Effect& turn, Target axis) {
 
 }  // namespace
 
+proto::Function function_of(const Axis& axis) {
+  Factor factor;
+  factor.axis = axis;
+  Function function;
+  set_axis(function, factor);
+  return function;
+}
+
 std::string field_name(std::uint8_t cells) {
   return fmt::format("{}{}", cells >= kFirstTrailGrid ? kTrailField : "traffic-", cells);
 }

@@ -18,6 +18,9 @@ namespace kilotwin::identify {
 /// "product".
 [[nodiscard]] const char* form_of(const Term&);
 
+/// A function of a covariate, without a shape.
+[[nodiscard]] proto::Function function_of(const Axis&);
+
 /// Name of the arena field of MotionModel::cells[cells]. Those of trails start with kTrailField.
 inline constexpr const char* kTrailField = "trail-";
 [[nodiscard]] std::string field_name(std::uint8_t cells);

@@ -71,6 +71,15 @@ proto::Model proto_of(const MotionModel& fitted) {
     field.set_corner_y_mm(rounded(fitted.cells[c].y_mm));
     if (fitted.cells[c].forget_s > 0) field.set_forget_s(rounded(fitted.cells[c].forget_s));
   }
+  if (fitted.stalls) {
+    proto::Effect& effect = add_effect(model, "stalls", proto::Effect::WHEEL_GAIN);
+    effect.add_function()->set_constant(rounded(fitted.stalls->gain - 1));
+    proto::Episodes& episodes = *effect.add_function()->mutable_episodes();
+    episodes.set_mean_apart_s(rounded(fitted.stalls->mean_apart_s));
+    episodes.set_scale_s(rounded(fitted.stalls->scale_s));
+    episodes.set_tail(rounded(fitted.stalls->tail));
+    episodes.set_longest_s(rounded(fitted.stalls->longest_s));
+  }
   std::set<std::string> names;
   std::map<std::string, int> terms_named;
   for (const Term& term : fitted.terms) {

@@ -6,11 +6,13 @@
 #include <Eigen/Core>
 #include <array>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "clients/identify/model/basis.hpp"
 #include "clients/identify/model/contact_geometry.hpp"
+#include "clients/identify/model/stalls.hpp"
 #include "clients/identify/model/traffic_grid.hpp"
 #include "core/effects/motion_change.hpp"
 
@@ -135,6 +137,7 @@ struct MotionModel {
                                                 {30, 0, 0, 10, true},
                                                 {50, 0, 0, 10, true}};
   std::vector<Term> terms;
+  std::optional<Stalls> stalls;  ///< none: no spells
   std::map<std::uint32_t, RobotBias> robots;
 
   /// The robot's posterior, or the population distribution.

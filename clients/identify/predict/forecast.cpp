@@ -66,6 +66,8 @@ class JointForecast {
       Robot& robot = robots_.emplace_back();
       robot.view = &bank->view();
       if (!bank->started()) continue;
+      // Most horizons have no spell, and in some a robot stands for long: no normal distribution describes that.
+      robot.needs_rollout = model.stalls.has_value();
       double sum = 0;
       for (const auto& h : bank->hypotheses()) sum += std::exp(h.log_weight);
       for (const auto& h : bank->hypotheses()) {
@@ -470,7 +472,7 @@ class RunForecasts {
     const MotionModel& model = *known.model;
     JointForecast joint(model, known.pointers(), known.grids, from_s, neighbours_, sample_s);
     joint.advance_to(start.time_s);
-    if (times_.rollouts > 0 && (model.contacts || known.grids.any() || Edges(model).any()))
+    if (times_.rollouts > 0 && (model.contacts || model.stalls || known.grids.any() || Edges(model).any()))
       joint.draw_rollouts(from_s, times_.rollouts, all_, {views_.front()->run, start.number});
     std::vector<Forecast> out;
     for (std::size_t i = 0; i < known.banks.size(); ++i) {

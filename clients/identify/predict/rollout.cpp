@@ -33,8 +33,8 @@ class Normals {
     }
     return out;
   }
-  [[nodiscard]] double uniform(std::uint32_t sample, std::uint32_t robot) const {
-    return (philox4x32({sample, robot, 0, 1u << 31}, key_)[0] + 0.5) * 0x1p-32;
+  [[nodiscard]] double uniform(std::uint32_t sample, std::uint32_t robot, std::uint32_t number = 0) const {
+    return (philox4x32({sample, robot, number, 1u << 31}, key_)[0] + 0.5) * 0x1p-32;
   }
 
  private:
@@ -50,8 +50,41 @@ Eigen::Matrix<double, n, 1> correlated(const Eigen::Matrix<double, n, n>& covari
   return root.transpositionsP().transpose() * (root.matrixL() * scaled);
 }
 
+/// The spells of one robot in one rollout.
+class SpellDraws {
+ public:
+  /// uniform(): the next random number.
+  template <class Uniform>
+  SpellDraws(const Stalls& stalls, Uniform&& uniform) : stalls_(&stalls), in_spell_(uniform() < stalls.share()) {
+    left_s_ = in_spell_ ? stalls.rest_s(uniform()) : -stalls.mean_apart_s * std::log(uniform());
+  }
+  /// Share of the next `for_s` in spells.
+  template <class Uniform> double share(double for_s, Uniform&& uniform) {
+    double rest_s = for_s, in_s = 0;
+    while (left_s_ < rest_s) {
+      if (in_spell_) in_s += left_s_;
+      rest_s -= left_s_;
+      in_spell_ = !in_spell_;
+      left_s_ = in_spell_ ? stalls_->length_s(uniform()) : -stalls_->mean_apart_s * std::log(uniform());
+    }
+    if (in_spell_) in_s += rest_s;
+    left_s_ -= rest_s;
+    return for_s > 0 ? in_s / for_s : 0;
+  }
+
+ private:
+  const Stalls* stalls_;
+  bool in_spell_;
+  double left_s_ = 0;
+};
+
 /// Joint random rollouts of robots: each has a known state, and steps with the process noise.
 class Rollout {
+  /// A function that draws the robot's next number for spells.
+  [[nodiscard]] auto uniforms_of(std::uint32_t r) {
+    return [this, r] { return normals_.uniform(sample_, r, ++drawn_[r]); };
+  }
+
  public:
   Rollout(const MotionModel& model, const std::vector<RolloutStart>& robots, bool neighbours,
           std::array<std::uint32_t, 2> key)
@@ -69,6 +102,8 @@ class Rollout {
     sample_ = sample;
     mirror_ = sample % 2 == 0 ? 1 : -1;
     filters_.clear();
+    spells_.clear();
+    drawn_.assign(robots_.size(), 0);
     for (std::uint32_t r = 0; r < robots_.size(); ++r) {
       double left = normals_.uniform(sample, r);
       std::size_t chosen = 0;
@@ -79,12 +114,14 @@ class Rollout {
       Belief& belief = filter.belief();
       belief.mean += mirror_ * correlated<5>(belief.covariance, normals_.draw<5>(sample / 2, r, 0));
       belief.covariance.setZero();
+      if (model_.stalls) spells_.emplace_back(*model_.stalls, uniforms_of(r));
     }
   }
   /// `number`: of the step, from 1.
   void step(std::uint32_t number, double now_s, double next_s, TrafficGrids& grids) {
     see_neighbours(now_s, next_s, grids);
     for (std::uint32_t r = 0; r < robots_.size(); ++r) {
+      if (model_.stalls) filters_[r].in_spell(spells_[r].share(next_s - now_s, uniforms_of(r)), 0, false);
       sub_steps(
           *robots_[r].view->clock, number == 1 ? robots_[r].now_s : now_s, next_s,
           [&](double t, double h, const CommandState& commands) { filters_[r].step(t, h, commands, near_[r]); });
@@ -149,7 +186,9 @@ class Rollout {
   std::uint32_t sample_ = 0;
   double mirror_ = 1;
   std::vector<TrackFilter> filters_;
-  std::vector<double> x_, y_;  ///< disc centres
+  std::vector<SpellDraws> spells_;    ///< of a model with stalls, by robot
+  std::vector<std::uint32_t> drawn_;  ///< numbers that they took
+  std::vector<double> x_, y_;         ///< disc centres
   std::vector<NeighbourView> near_;
   std::vector<Neighbour> who_;  ///< at the step's start
   std::vector<OtherRobot> list_;

@@ -271,6 +271,24 @@ Effect slow_leader() {
           {}};
 }
 
+Effect crowd_noise() {
+  return {"crowd-noise",
+          "speeds vary with 1 + 2.5 k / (k + 1) of the standard deviation, k = sum of (60 mm / d)^4 over robots at "
+          "d < 250 mm",
+          {{"neighbours"}},
+          {"robot", "time", "position"},
+          {},
+          {},
+          [](const Situation& at) {
+            double k = 0;
+            for (const Vec& other : *at.discs) {
+              const double d = distance(at.disc, other.x, other.y);
+              if (d > 1 && d < 250) k += square(square(60 / d));
+            }
+            return 1 + 2.5 * k / (k + 1);
+          }};
+}
+
 Effect bent_headings() {
   return {"bent-headings",
           "measured headings are off by 0.35 rad sin(2 pi (x + 60 mm) / 700 mm) cos(2 pi y / 900 mm)",
@@ -298,7 +316,7 @@ Effect parallax() {
 Effect stalls() {
   return {.name = "stalls",
           .formula = "in 6 % of slots of 2.5 s, at random, both motors of a robot stand",
-          .named_by = {},
+          .named_by = {{"episodes"}},
           .mistaken_for = {},
           .push =
               [](const Situation& at, Push& push) {
@@ -307,6 +325,48 @@ Effect stalls() {
           .see = {},
           .noise = {},
           .by_chance = true};
+}
+
+Effect rare_spells(RareSpells spells) {
+  const auto in_spell = [spells](const Situation& at) {
+    double t = 0;
+    for (int n = 0; t <= at.time_s; ++n) {
+      const auto uniform = [&](int which) { return 1 - chance(at.run, at.robot, 100000 + 2 * n + which); };
+      t -= spells.mean_apart_s * std::log(uniform(0));
+      const double end = t + spells.scale_s * (std::pow(uniform(1), -1 / spells.tail) - 1);
+      if (at.time_s >= t && at.time_s < end) return true;
+      t = end;
+    }
+    return false;
+  };
+  return {.name = "rare-spells",
+          .formula = "renewal process of spells: exponential times from one to the next, Lomax durations",
+          .named_by = {{"episodes"}},
+          .mistaken_for = {},
+          .push =
+              [in_spell, spells](const Situation& at, Push& push) {
+                if (in_spell(at)) slow_both(push, spells.speed);
+              },
+          .see = {},
+          .noise = {},
+          .by_chance = true};
+}
+
+Effect heavy_tailed_noise() {
+  return {
+      .name = "heavy-tailed-noise",
+      .formula =
+          "the standard deviation of each step's noise is 0.7 u^(-2/5) times the common one, at most 20, u uniform",
+      .named_by = {},
+      .mistaken_for = {},
+      .push = {},
+      .see = {},
+      .noise =
+          [](const Situation& at) {
+            const double u = chance(at.run, at.robot, 5000000 + static_cast<int>(at.time_s / 0.1));
+            return std::min(20.0, 0.7 * std::pow(u, -0.4));
+          },
+      .by_chance = true};
 }
 
 }  // namespace kilotwin::truth

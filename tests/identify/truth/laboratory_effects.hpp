@@ -31,6 +31,7 @@ Effect patch_of_some_more();  // a patch that slows each robot by another amount
 Effect replaced_robots();     // two robots are replaced during each run
 Effect driving_crowd();       // robots are slow among others that drive
 Effect slow_leader();         // robots near robot 0 are slow
+Effect crowd_noise();         // wheels vary more among other robots
 
 // Measurement.
 Effect bent_headings();  // measured headings are off, by place
@@ -38,5 +39,13 @@ Effect parallax();       // tall robots are seen farther from the camera's foot
 
 /// Chance events: motors stall for some seconds. The oracle does not know them.
 Effect stalls();
+/// The same as a renewal process: exponential times from one spell to the next, Lomax durations.
+struct RareSpells {
+  double mean_apart_s = 60, scale_s = 6, tail = 2.5;
+  double speed = 0;  ///< factor within a spell
+};
+Effect rare_spells(RareSpells);
+/// The standard deviation of each step's noise has a heavy tail. No mean depends on anything.
+Effect heavy_tailed_noise();
 
 }  // namespace kilotwin::truth

@@ -188,6 +188,8 @@ const Entry kEntries[] = {
     {"gusts-blind", "the same, with one frame a second and no headings",
      [] { return with(sparse_lab(), Effects{gusts()}); }},
     {"rising-noise", "noise: speeds vary more and more", [] { return with(tidy_lab(), Effects{rising_noise()}); }},
+    {"crowd-noise", "noise: speeds vary more near other robots",
+     [] { return with(tidy_lab(), Effects{crowd_noise()}); }},
     {"bowl", "world_frame and position: the floor sags", [] { return with(poor_lab(), Effects{bowl()}); }},
     {"drawing-walls", "world_frame and position: robots are drawn to two walls",
      [] {
@@ -243,6 +245,16 @@ const Entry kEntries[] = {
      }},
     {"stalls", "no effect that can be known: motors stall at random",
      [] { return with(tidy_lab(), Effects{stalls()}); }},
+    {"rare-stalls", "motors stall at random, once a minute, with rare long spells",
+     [] { return with(tidy_lab(), Effects{rare_spells({})}); }},
+    {"rare-slips", "the same, one frame a second and no headings: wheels slip to 40 % of their speed",
+     [] {
+       return with(sparse_lab(), Effects{rare_spells({45, 9, 3, 0.4})});
+     }},
+    {"stalls-battery", "time, and motors that stall at random",
+     [] {
+       return with(blind_lab(), Effects{rare_spells({}), battery_by_the_clock()});
+     }},
     {"stalls-patch", "position, and motors that stall at random",
      [] {
        return with(tidy_lab(), Effects{stalls(), slow_patch()});
@@ -268,6 +280,8 @@ const Entry kEntries[] = {
        s.coarse = 0.04;
        return s;
      }},
+    {"nothing-heavy", "no effect, noise with a heavy tail",
+     [] { return with(tidy_lab(), Effects{heavy_tailed_noise()}); }},
     // Faults of the data.
     {"swapped", "robots 3 and 9 exchange their numbers in run 1",
      [] {

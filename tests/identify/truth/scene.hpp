@@ -78,7 +78,7 @@ struct Effect {
   std::function<void(const Situation&, View&)> see;
   /// Factor of the standard deviation of f; may be empty.
   std::function<double(const Situation&)> noise = {};
-  /// Chance events, which no predictor can know: the oracle does without them, and no finding has to name them.
+  /// Chance events, which no predictor can know: the oracle does without them. If nothing names them, no finding has to.
   bool by_chance = false;
   /// True values of numbers that the result gives by these names (Effect.numbers in idl/identification.proto): centres, instants.
   std::map<std::string, double> numbers = {};

@@ -1,0 +1,186 @@
+#include "clients/identify/fit/spell_filter.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "clients/identify/fit/likelihood.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+constexpr std::size_t kMostHypotheses = 6;
+/// A hypothesis this much less likely than the best is dropped, nat.
+constexpr double kMostBelow = 12;
+/// A single hypothesis without a spell is not divided at a squared Mahalanobis distance below this one.
+constexpr double kBenign = 6;
+/// A start or an end lies in one of three parts of an interval.
+constexpr int kParts = 3;
+
+/// One interval of a history.
+struct Node {
+  std::ptrdiff_t parent;
+  float share;
+  bool in_spell;  ///< at its end
+};
+
+struct History {
+  TrackFilter filter;
+  double log_weight = 0;
+  std::ptrdiff_t node = -1;
+  bool in_spell = false;
+  double lasted_s = 0;       ///< of the present spell
+  std::uint32_t recent = 0;  ///< what happened in the latest intervals, two bits each
+};
+
+double log_sum(double a, double b) { return std::max(a, b) + std::log1p(std::exp(-std::abs(a - b))); }
+
+class SpellFilter {
+ public:
+  SpellFilter(const MotionModel& model, const TrackView& view)
+      : stalls_(*model.stalls), view_(view), samples_(view.track->samples) {
+    RobotBias bias = model.bias_of(view.track->robot);
+    bias.covariance.setZero();
+    TrackFilter filter(model, bias, view.track->robot, view.number);
+    filter.start(samples_.front(), {}, view.start_heading_rad, view.start_heading_sd_rad);
+    const double share = std::clamp(stalls_.share(), 1e-6, 0.5);
+    histories_.push_back({filter, std::log(1 - share), -1, false, 0, 0});
+    histories_.push_back({filter, std::log(share), -1, true, 0, 0});
+  }
+
+  TrackSpells run() {
+    for (std::size_t i = 1; i < samples_.size(); ++i) interval(i);
+    if (view_.work != nullptr) *view_.work += steps_;
+    return result();
+  }
+
+ private:
+  /// Carries a filter through an interval with this share of it in a spell. Returns whether the motion shows spells.
+  bool carry(History& h, std::size_t i, double share, double variance_s) {
+    LogLikelihood counted;
+    bool driven = false;
+    const double before_s = samples_[i - 1].time_s;
+    h.filter.in_spell(share, variance_s, false);
+    h.filter.at_boundary((*view_.at_boundary)[i - 1] || (*view_.at_boundary)[i]);
+    sub_steps(*view_.clock, before_s, samples_[i].time_s,
+              [&](double t, double step_s, const CommandState& commands) {
+                const StepRecord record =
+                    h.filter.step(t, step_s, commands, view_.neighbours->view(view_.place, t + step_s / 2));
+                counted.step(record);
+                driven = driven || commands.driven();
+                ++steps_;
+              });
+    const Innovation innovation = h.filter.update(samples_[i], view_.clock->at(samples_[i].time_s - 1e-9));
+    distance2_ = innovation.distance2;
+    ContactGate gate = counted.gate;
+    const bool free = gate.update(innovation) == ContactGate::Counts::kAll;
+    counted.update(innovation, samples_[i]);
+    h.log_weight += counted.sum;
+    return driven && free;
+  }
+  void add(History h, std::size_t i, bool in_spell, double share, std::uint32_t what) {
+    const double length_s = samples_[i].time_s - samples_[i - 1].time_s;
+    h.lasted_s = !in_spell ? 0 : h.in_spell ? h.lasted_s + length_s : share * length_s;
+    h.in_spell = in_spell;
+    nodes_.push_back({h.node, static_cast<float>(share), in_spell});
+    h.node = static_cast<std::ptrdiff_t>(nodes_.size()) - 1;
+    constexpr std::uint32_t kRecent = 0xffff;
+    h.recent = (h.recent << 2 | what) & kRecent;
+    next_.push_back(std::move(h));
+  }
+  void interval(std::size_t i) {
+    const double length_s = samples_[i].time_s - samples_[i - 1].time_s;
+    next_.clear();
+    for (const History& h : histories_) {
+      const double stay =
+          h.in_spell ? stalls_.survival(h.lasted_s + length_s) / std::max(stalls_.survival(h.lasted_s), 1e-300)
+                     : std::exp(-length_s / stalls_.mean_apart_s);
+      const double log_stay = std::log(std::max(stay, 1e-300)), log_go = std::log(std::max(1 - stay, 1e-12));
+      History same = h;
+      const bool shown = carry(same, i, h.in_spell ? 1 : 0, 0);
+      same.log_weight += log_stay;
+      const bool divide = histories_.size() > 1 || h.in_spell || distance2_ > kBenign;
+      if (divide && !shown) {
+        History other = same;
+        other.log_weight += log_go - log_stay;
+        add(std::move(other), i, !h.in_spell, 0.5, 2);
+      }
+      for (int part = 0; divide && shown && part < kParts; ++part) {
+        History other = h;
+        const double share = (part + 0.5) / kParts;
+        carry(other, i, share, length_s / (12.0 * kParts * kParts));
+        other.log_weight += log_go - std::log(kParts);
+        add(std::move(other), i, !h.in_spell, share, static_cast<std::uint32_t>(part) + 1);
+      }
+      add(std::move(same), i, h.in_spell, h.in_spell ? 1 : 0, 0);
+    }
+    prune();
+  }
+  /// Merges histories that were the same of late, and keeps the best.
+  void prune() {
+    std::stable_sort(next_.begin(), next_.end(),
+                     [](const History& a, const History& b) { return a.log_weight > b.log_weight; });
+    histories_.clear();
+    for (History& h : next_) {
+      const auto like = std::find_if(histories_.begin(), histories_.end(), [&](const History& k) {
+        return k.in_spell == h.in_spell && k.recent == h.recent;
+      });
+      if (like != histories_.end()) {
+        like->log_weight = log_sum(like->log_weight, h.log_weight);
+      } else if (histories_.size() < kMostHypotheses &&
+                 (histories_.empty() || h.log_weight > histories_.front().log_weight - kMostBelow)) {
+        histories_.push_back(std::move(h));
+      }
+    }
+  }
+
+  [[nodiscard]] TrackSpells result() const {
+    TrackSpells out;
+    out.log_likelihood = histories_.front().log_weight;
+    for (std::size_t h = 1; h < histories_.size(); ++h)
+      out.log_likelihood = log_sum(out.log_likelihood, histories_[h].log_weight);
+    out.share.assign(samples_.size(), 0);
+    for (const History& h : histories_) {
+      const double weight = std::exp(h.log_weight - out.log_likelihood);
+      std::size_t i = samples_.size();
+      for (std::ptrdiff_t n = h.node; n >= 0; n = nodes_[static_cast<std::size_t>(n)].parent)
+        out.share[--i] += static_cast<float>(weight * nodes_[static_cast<std::size_t>(n)].share);
+    }
+    add_spells(out);
+    return out;
+  }
+  void add_spells(TrackSpells& out) const {
+    const History& best =
+        *std::max_element(histories_.begin(), histories_.end(),
+                          [](const History& a, const History& b) { return a.log_weight < b.log_weight; });
+    std::vector<Node> path;
+    for (std::ptrdiff_t n = best.node; n >= 0; n = path.back().parent)
+      path.push_back(nodes_[static_cast<std::size_t>(n)]);
+    std::reverse(path.begin(), path.end());
+    Spell spell{0, 0, false};
+    for (std::size_t i = 0; i < path.size(); ++i) {
+      const double length_s = samples_[i + 1].time_s - samples_[i].time_s, share = path[i].share;
+      out.between_s += (1 - share) * length_s;
+      if (share > 0 && spell.length_s == 0)
+        spell = {samples_[i].time_s + (1 - share) * length_s, 0, i == 0 && share == 1};
+      spell.length_s += share * length_s;
+      if (spell.length_s == 0 || (path[i].in_spell && i + 1 < path.size())) continue;
+      spell.censored = spell.censored || path[i].in_spell;
+      out.spells.push_back(std::exchange(spell, {0, 0, false}));
+    }
+  }
+
+  const Stalls& stalls_;
+  const TrackView& view_;
+  const std::vector<Sample>& samples_;
+  std::vector<History> histories_, next_;
+  std::vector<Node> nodes_;
+  std::uint64_t steps_ = 0;
+  double distance2_ = 0;  ///< of the latest innovation
+};
+
+}  // namespace
+
+TrackSpells spells_of(const MotionModel& model, const TrackView& view) { return SpellFilter(model, view).run(); }
+
+}  // namespace kilotwin::identify

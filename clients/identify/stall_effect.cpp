@@ -1,0 +1,238 @@
+#include "clients/identify/stall_effect.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "clients/identify/fit/likelihood.hpp"
+#include "clients/identify/fit/spell_filter.hpp"
+#include "clients/identify/model/model_file.hpp"
+#include "clients/identify/result/values.hpp"
+#include "core/os/worker_pool.hpp"
+#include "core/stats/distributions.hpp"
+#include "core/stats/quantiles.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+constexpr std::size_t kFewestSpells = 5;
+/// As of effects on the noise.
+constexpr double kStallThreshold_log10_p = -5, kLeastStallGain = 10, kLeastStallErrors = 3;
+constexpr std::size_t kRobotFolds = 6;
+/// Heavy tails of the noise make robots faster as often as slower. Spells of a higher speed must gain less than this share.
+constexpr double kMostMirrored = 0.5;
+/// Mean time apart, number, scale and tail of durations; and the speed within, if it is not zero.
+constexpr std::uint32_t kDegrees = 3;
+
+/// The tracks of the fit with spells, and without.
+class SpellScan {
+ public:
+  SpellScan(const FitState& state, std::uint32_t threads) : views_(state.tracks.views()), threads_(threads) {
+    plain_.assign(views_.size(), 0);
+    os::in_parallel(views_.size(), threads_, [&](std::size_t v) {
+      if (!views_[v].track->held_out) plain_[v] = likelihood_of(state.model, views_[v]).sum;
+    });
+    std::vector<double> lengths_s;
+    for (const TrackView& view : views_) {
+      const std::vector<Sample>& samples = view.track->samples;
+      longest_s_ = std::max(longest_s_, samples.back().time_s - samples.front().time_s);
+      lengths_s.push_back((samples.back().time_s - samples.front().time_s) /
+                          static_cast<double>(samples.size() - 1));
+    }
+    least_s_ = stats::upper_median(lengths_s) / 2;
+  }
+
+  struct Found {
+    std::vector<TrackSpells> tracks;  ///< by view; empty for held-out ones
+    std::vector<double> gains;        ///< of the log likelihood, by view
+    std::size_t spells = 0;
+    double gain = 0;
+  };
+  /// `stalls_of(v)`: those of the view v.
+  template <class Of> [[nodiscard]] Found scan_by(const MotionModel& model, Of&& stalls_of) const {
+    Found out;
+    out.tracks.resize(views_.size());
+    out.gains.assign(views_.size(), 0);
+    os::in_parallel(views_.size(), threads_, [&](std::size_t v) {
+      if (views_[v].track->held_out) return;
+      MotionModel with = model;
+      with.stalls = stalls_of(v);
+      out.tracks[v] = spells_of(with, views_[v]);
+      out.gains[v] = out.tracks[v].log_likelihood - plain_[v];
+    });
+    for (std::size_t v = 0; v < views_.size(); ++v) {
+      out.spells += out.tracks[v].spells.size();
+      out.gain += out.gains[v];
+    }
+    return out;
+  }
+  [[nodiscard]] Found scan(const MotionModel& model, const Stalls& stalls) const {
+    return scan_by(model, [&](std::size_t) { return stalls; });
+  }
+  /// The parameters of maximum likelihood by the spells of the views that `use` picks.
+  template <class Use> [[nodiscard]] Stalls refined(const Found& found, Stalls stalls, Use&& use) const {
+    std::vector<Spell> spells;
+    double between_s = 0, starts = 0;
+    for (std::size_t v = 0; v < found.tracks.size(); ++v) {
+      if (!use(v)) continue;
+      between_s += found.tracks[v].between_s;
+      for (const Spell& spell : found.tracks[v].spells) {
+        spells.push_back(spell);
+        starts += spell.start_s > views_[v].track->samples.front().time_s ? 1 : 0;
+      }
+    }
+    stalls.longest_s = longest_s_;
+    fit_lengths(spells, least_s_, stalls);
+    // Short spells are not seen.
+    stalls.mean_apart_s = std::max(1.0, between_s * stalls.survival(least_s_) / std::max(starts, 0.5));
+    return stalls;
+  }
+  [[nodiscard]] Stalls refined(const Found& found, const Stalls& stalls) const {
+    return refined(found, stalls, [](std::size_t) { return true; });
+  }
+  [[nodiscard]] const std::vector<TrackView>& views() const { return views_; }
+
+ private:
+  const std::vector<TrackView> views_;
+  const std::uint32_t threads_;
+  std::vector<double> plain_;  ///< log likelihood without spells, by view
+  double longest_s_ = 0, least_s_ = 0;
+};
+
+/// Stalls with parameters fitted at this speed within spells, and their gain. Without enough spells: no gain.
+std::pair<Stalls, double> first_fit(const SpellScan& scan, const MotionModel& model, double speed) {
+  Stalls stalls;
+  stalls.gain = speed;
+  SpellScan::Found found = scan.scan(model, stalls);
+  if (found.spells < kFewestSpells) return {stalls, 0};
+  stalls = scan.refined(found, stalls);
+  found = scan.scan(model, stalls);
+  return {scan.refined(found, stalls), found.spells < kFewestSpells ? 0 : found.gain};
+}
+
+/// The most likely speed within spells. 0 if the data do not exclude it.
+double fitted_speed(const SpellScan& scan, const MotionModel& model, Stalls stalls) {
+  constexpr double kFirst = 0.2, kLast = 0.05, kMost = 0.9, kClear = 3;
+  const auto value = [&](double speed) {
+    stalls.gain = speed;
+    return scan.scan(model, stalls).gain;
+  };
+  double best = stalls.gain, gain = value(best);
+  for (double step = kFirst; step >= kLast;) {
+    bool moved = false;
+    for (const double to : {best - step, best + step}) {
+      if (to < 0 || to > kMost) continue;
+      const double found = value(to);
+      if (found <= gain) continue;
+      gain = found;
+      best = to;
+      moved = true;
+      break;
+    }
+    if (!moved) step /= 2;
+  }
+  return best > 0 && value(0) > gain - kClear ? 0 : best;
+}
+
+/// Refits everything beside the spells.
+SpellScan::Found refit(const SpellScan& scan, const Fitter& fitter, SpellScan::Found found, FitState& state) {
+  constexpr int kRounds = 2;
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<std::vector<float>> shares;
+    for (TrackSpells& track : found.tracks) shares.push_back(std::move(track.share));
+    state.tracks.set_spells(std::move(shares));
+    fitter.fit(state, 2);
+    if (round == 0) state.model.stalls->gain = fitted_speed(scan, state.model, *state.model.stalls);
+    found = scan.scan(state.model, *state.model.stalls);
+    state.model.stalls = scan.refined(found, *state.model.stalls);
+  }
+  return scan.scan(state.model, *state.model.stalls);
+}
+
+/// The gain on robots whose spells take no part in the parameters of the stalls, and its standard error over tracks.
+std::pair<double, double> cross_validated(const SpellScan& scan, const SpellScan::Found& found,
+                                          const FitState& state) {
+  std::map<std::uint32_t, std::size_t> fold;
+  for (const TrackView& view : scan.views()) fold.emplace(view.track->robot, 0);
+  std::size_t next = 0;
+  for (auto& [robot, at] : fold) at = next++ % kRobotFolds;
+  const auto fold_of = [&](std::size_t v) { return fold.at(scan.views()[v].track->robot); };
+  std::vector<Stalls> without;
+  for (std::size_t k = 0; k < kRobotFolds; ++k)
+    without.push_back(scan.refined(found, *state.model.stalls, [&](std::size_t v) { return fold_of(v) != k; }));
+  const SpellScan::Found judged = scan.scan_by(state.model, [&](std::size_t v) { return without[fold_of(v)]; });
+  double tracks = 0, squares = 0;
+  for (const TrackView& view : scan.views()) tracks += view.track->held_out ? 0 : 1;
+  for (std::size_t v = 0; v < scan.views().size(); ++v)
+    if (!scan.views()[v].track->held_out) squares += std::pow(judged.gains[v] - judged.gain / tracks, 2);
+  return {judged.gain, std::sqrt(squares * tracks / std::max(tracks - 1, 1.0))};
+}
+
+}  // namespace
+
+std::optional<StallEffect> find_stalls(const Fitter& fitter, FitState& state) {
+  const SpellScan scan(state, fitter.threads());
+  // Robots that stand still, and robots that lose half of their speed.
+  std::pair<Stalls, double> best{{}, 0};
+  for (const double speed : {0.0, 0.5})
+    if (const auto one = first_fit(scan, state.model, speed); one.second > best.second) best = one;
+  if (!(best.second > kLeastStallGain)) return std::nullopt;
+  if (first_fit(scan, state.model, 2 - best.first.gain).second > kMostMirrored * best.second) return std::nullopt;
+  FitState trial = state;
+  trial.model.stalls = best.first;
+  const SpellScan::Found found = refit(scan, fitter, scan.scan(state.model, best.first), trial);
+  StallEffect out;
+  out.stalls = *trial.model.stalls;
+  out.spells = found.spells;
+  out.gain = found.gain;
+  out.degrees = kDegrees + (out.stalls.gain > 0 ? 1 : 0);
+  out.log10_p = stats::log10_chi_squared_tail(2 * std::max(0.0, out.gain), out.degrees);
+  std::tie(out.held_out, out.held_out_se) = cross_validated(scan, found, trial);
+  if (out.spells < kFewestSpells || !(out.log10_p < kStallThreshold_log10_p) || !(out.held_out > kLeastStallGain) ||
+      !(out.held_out > kLeastStallErrors * out.held_out_se))
+    return std::nullopt;
+  std::vector<std::vector<float>> shares;
+  for (const TrackSpells& track : found.tracks) shares.push_back(track.share);
+  trial.tracks.set_spells(std::move(shares));
+  state = std::move(trial);
+  return out;
+}
+
+identification::Effect entry_of(const StallEffect& found) {
+  const Stalls& stalls = found.stalls;
+  identification::Effect out;
+  out.set_name("stalls");
+  out.add_covariates("episodes");
+  out.set_acts_on("WHEEL_GAIN");
+  identification::Evidence& evidence = *out.mutable_evidence();
+  evidence.set_log10_p(found.log10_p);
+  evidence.set_threshold_log10_p(kStallThreshold_log10_p);
+  evidence.set_log_likelihood_gain(found.gain);
+  *evidence.mutable_held_out_gain() = json_value(found.held_out);
+  *evidence.mutable_held_out_gain_se() = json_value(found.held_out_se);
+  evidence.set_degrees(found.degrees);
+  auto& parameters = *out.mutable_parameters()->mutable_fields();
+  parameters["form"] = json_value("episodes");
+  parameters["spells"] = json_value(static_cast<double>(found.spells));
+  parameters["mean_apart_s"] = json_value(stalls.mean_apart_s);
+  parameters["scale_s"] = json_value(stalls.scale_s);
+  parameters["tail"] = json_value(stalls.tail);
+  parameters["mean_length_s"] = json_value(stalls.mean_length_s());
+  parameters["share_of_time"] = json_value(stalls.share());
+  parameters["speed"] = json_value(stalls.gain);
+  *out.mutable_rmse_without_mm() = json_null();
+  *out.mutable_share_removed() = json_null();
+  out.set_in_words(fmt::format(
+      "robots {} at random although a motor is on: {:.0f} s from one spell to the next on average, P(duration > t) "
+      "= (1 + t / "
+      "{:.1f} s)^-{:.1f}, {:.1f} s on average",
+      stalls.gain > 0 ? fmt::format("slip to {:.0f} % of their speed", 100 * stalls.gain) : "stand still",
+      stalls.mean_apart_s, stalls.scale_s, stalls.tail, stalls.mean_length_s()));
+  return out;
+}
+
+}  // namespace kilotwin::identify

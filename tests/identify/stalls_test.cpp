@@ -1,0 +1,133 @@
+// Stalls and slips as rare events: their law, the filter that finds spells, and the effect that is written.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "clients/identify/fit/fitter.hpp"
+#include "clients/identify/model/model_file.hpp"
+#include "clients/identify/stall_effect.hpp"
+#include "tests/identify/small_set.hpp"
+#include "tests/identify/truth/laboratory_effects.hpp"
+
+namespace kilotwin {
+namespace {
+
+using namespace identify;
+
+TEST(Stalls, MomentsAreThoseOfTheirLaw) {
+  Stalls stalls;
+  stalls.mean_apart_s = 40;
+  stalls.scale_s = 6;
+  stalls.tail = 2.5;
+  stalls.longest_s = 200;
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> uniform(1e-12, 1);
+  // The mean duration, and moments of the time in spells during 10 s from a random instant on.
+  double lengths = 0;
+  constexpr int kDraws = 200000;
+  for (int i = 0; i < kDraws; ++i) lengths += stalls.length_s(uniform(random));
+  EXPECT_NEAR(lengths / kDraws, stalls.mean_length_s(), 0.02 * stalls.mean_length_s());
+  double sum = 0, square = 0;
+  constexpr double kOver_s = 10;
+  for (int i = 0; i < kDraws; ++i) {
+    bool in = uniform(random) < stalls.share();
+    double left_s = in ? stalls.rest_s(uniform(random)) : -stalls.mean_apart_s * std::log(uniform(random));
+    double rest_s = kOver_s, in_s = 0;
+    while (rest_s > 0) {
+      const double now_s = std::min(left_s, rest_s);
+      if (in) in_s += now_s;
+      rest_s -= now_s;
+      in = !in;
+      left_s = in ? stalls.length_s(uniform(random)) : -stalls.mean_apart_s * std::log(uniform(random));
+    }
+    sum += in_s;
+    square += in_s * in_s;
+  }
+  EXPECT_NEAR(sum / kDraws / kOver_s, stalls.share(), 0.02 * stalls.share());
+  const double variance_s = (square / kDraws - std::pow(sum / kDraws, 2)) / kOver_s;
+  EXPECT_NEAR(variance_s, stalls.variance_s(kOver_s), 0.1 * variance_s);
+}
+
+TEST(Stalls, DurationsAreFittedWithCensoring) {
+  Stalls truth;
+  truth.scale_s = 8;
+  truth.tail = 3;
+  std::mt19937_64 random(4);
+  std::uniform_real_distribution<double> uniform(1e-12, 1);
+  constexpr double kSeen_s = 6, kLeast_s = 0.25;
+  std::vector<Spell> spells;
+  for (int i = 0; i < 4000; ++i) {
+    const double length_s = truth.length_s(uniform(random));
+    if (length_s > kLeast_s) spells.push_back({0, std::min(length_s, kSeen_s), length_s > kSeen_s});
+  }
+  Stalls fitted = truth;
+  fit_lengths(spells, kLeast_s, fitted);
+  EXPECT_NEAR(fitted.mean_length_s(), truth.mean_length_s(), 0.25 * truth.mean_length_s());
+  for (const double t : {0.5, 2.0, 5.0}) EXPECT_NEAR(fitted.survival(t), truth.survival(t), 0.03);
+}
+
+/// A base model fitted to a scene, and the stalls that are found beside it.
+struct WithStalls {
+  explicit WithStalls(const truth::Scene& scene, std::uint64_t seed = 5)
+      : set(set_of(scene, played(scene, seed))), fitter(set, 2), state(set) {
+    fitter.fit_base(state);
+    base = state.model;
+    found = find_stalls(fitter, state);
+  }
+  MeasuredSet set;
+  Fitter fitter;
+  FitState state;
+  MotionModel base;
+  std::optional<StallEffect> found;
+};
+
+TEST(Stalls, AreFoundWithTheirParametersAndWritten) {
+  truth::Scene scene = small({truth::rare_spells({30, 6, 2.5, 0})});
+  scene.train_runs = 3;
+  const WithStalls f(scene);
+  ASSERT_TRUE(f.found);
+  const Stalls& stalls = f.found->stalls;
+  EXPECT_EQ(stalls.gain, 0);
+  EXPECT_NEAR(stalls.mean_apart_s, 30, 6);
+  EXPECT_NEAR(stalls.mean_length_s(), 4, 1.2);
+  EXPECT_GT(f.found->held_out, 100);
+  // The noise and the speeds are those beside the spells. With a spell every 30 s the noise keeps a remainder.
+  const double truth_s = scene.factor_sd * scene.factor_sd * scene.step_s;
+  EXPECT_LT(f.state.model.noise.factor_s, 2 * truth_s);
+  EXPECT_GT(f.state.model.noise.factor_s, 0.5 * truth_s);
+  EXPECT_LT(f.state.model.noise.factor_s + f.state.model.noise.wheel_mm2_s,
+            f.base.noise.factor_s + f.base.noise.wheel_mm2_s);
+  EXPECT_NEAR(f.state.model.base.straight_mm_s + f.state.model.base.bias_mean_mm_s, 10.0, 0.5);
+  const proto::Model model = proto_of(f.state.model);
+  int written = 0;
+  for (const proto::Effect& effect : model.effect()) {
+    if (effect.name() != "stalls") continue;
+    ++written;
+    EXPECT_EQ(effect.acts_on(), proto::Effect::WHEEL_GAIN);
+    EXPECT_EQ(effect.function(0).constant(), -1);
+    EXPECT_NEAR(effect.function(1).episodes().mean_apart_s(), stalls.mean_apart_s, 1e-3);
+    EXPECT_NEAR(effect.function(1).episodes().tail(), stalls.tail, 1e-3);
+  }
+  EXPECT_EQ(written, 1);
+}
+
+TEST(Stalls, SlipsHaveASpeed) {
+  const WithStalls f(small({truth::rare_spells({30, 9, 3, 0.4})}));
+  ASSERT_TRUE(f.found);
+  EXPECT_NEAR(f.found->stalls.gain, 0.4, 0.1);
+}
+
+TEST(Stalls, AreNotFoundInNoise) {
+  EXPECT_FALSE(WithStalls(small({})).found);
+  EXPECT_FALSE(WithStalls(small({truth::heavy_tailed_noise()})).found) << "a heavy tail";
+  truth::Scene coarse = small({});
+  coarse.coarse = 0.04;
+  EXPECT_FALSE(WithStalls(coarse).found) << "positions that are off";
+  truth::Scene crowded = small({});
+  crowded.width_mm = crowded.height_mm = 400;
+  EXPECT_FALSE(WithStalls(crowded).found) << "robots that block each other";
+}
+
+}  // namespace
+}  // namespace kilotwin
