@@ -13,6 +13,7 @@
 #include "clients/identify/last_check.hpp"
 #include "clients/identify/model/model_file.hpp"
 #include "clients/identify/replay/simulation_check.hpp"
+#include "clients/identify/search/products.hpp"
 #include "clients/identify/search/standing_circles.hpp"
 #include "clients/identify/unexplained/prediction_windows.hpp"
 #include "core/base/error.hpp"
@@ -137,6 +138,7 @@ FitState refitted(const Fitter& fitter, const FitState& part, const MeasuredSet&
   all.tracks.set_command_lag(part.model.base.command_lag_s);
   all.tracks.find_centres(all.model, fitter.threads());
   fitter.fit(all, 2);
+  refit_tables(fitter, all);
   return all;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "clients/identify/search/change_points.hpp"
@@ -605,6 +606,80 @@ bool separate(const Fitter& fitter, FitState& state, std::size_t place) {
   if (!(fitter.log_likelihood(trial) - product.cost() > value)) return false;
   state = std::move(trial);
   return true;
+}
+
+namespace {
+
+/// Gives a table of robots a key for each robot of the tracks, with the value of an unseen one.
+void add_robots(Factor& table, const std::vector<std::uint32_t>& robots) {
+  if (table.axis.of != Covariate::kRobot) return;
+  for (const std::uint32_t robot : robots) {
+    const auto at = std::lower_bound(table.points.begin(), table.points.end(), robot);
+    if (at != table.points.end() && *at == robot) continue;
+    table.known.insert(table.known.begin() + (at - table.points.begin()), 0);
+    table.points.insert(at, robot);
+  }
+}
+
+/// Keys without data, which have no column and the value 0, get the mean of the others.
+void fill_with_mean(Factor& table) {
+  const auto none = std::count(table.known.begin(), table.known.end(), 0.0);
+  const auto others = static_cast<double>(table.known.size()) - static_cast<double>(none);
+  if (others == 0) return;
+  const double mean = std::accumulate(table.known.begin(), table.known.end(), 0.0) / others;
+  std::replace(table.known.begin(), table.known.end(), 0.0, mean);
+}
+
+bool is_same_table(const Factor& a, const Factor& b) {
+  return a.shape == b.shape && a.axis == b.axis && a.points == b.points && a.known == b.known && a.plus == b.plus;
+}
+
+/// Opens the known table at `place` among the factors of a product, fits it, and puts its new values in place of the old ones.
+void refit_table(const Fitter& fitter, FitState& state, std::size_t t, std::size_t place) {
+  Term kept = state.model.terms[t];
+  std::vector<Factor> functions = functions_of(kept);
+  const Factor old = kept.blocks.front().basis.factors[place];
+  const auto at =
+      std::find_if(functions.begin(), functions.end(), [&](const Factor& f) { return is_same_table(f, old); });
+  if (at == functions.end()) return;
+  std::rotate(at, at + 1, functions.end());
+  double unit = 1;
+  for (std::size_t i = 0; i + 1 < functions.size(); ++i) {
+    const double size = size_of(functions[i]);
+    if (!(size > 0)) return;
+    scale(functions[i], 1 / size);
+    unit *= size;
+  }
+  add_robots(functions.back(), extent_of(state.tracks).robots);
+  functions.back() = shape_of(functions.back(), false);
+  FitState trial = state;
+  refine_to(fitter, trial, t, {{kept.blocks.front().target, Basis{functions}, kept.blocks.front().during}}, 1);
+  std::optional<Factor> table = function_of(trial.model.terms[t]);
+  if (!table) return;
+  fill_with_mean(*table);
+  scale(*table, 1 / unit);
+  for (Block& block : kept.blocks)
+    for (Factor& factor : block.basis.factors)
+      if (is_same_table(factor, old)) factor = *table;
+  about_the_mean(kept);
+  trial.model.terms[t] = std::move(kept);
+  fitter.fit(trial, 2);
+  // Negated, so that a likelihood that is no number does not count.
+  if (!(fitter.log_likelihood(trial) > fitter.log_likelihood(state))) return;
+  state = std::move(trial);
+}
+
+}  // namespace
+
+void refit_tables(const Fitter& fitter, FitState& state) {
+  for (std::size_t t = 0; t < state.model.terms.size(); ++t) {
+    if (functions_of(state.model.terms[t]).size() < 2) continue;
+    const std::size_t factors = state.model.terms[t].blocks.front().basis.factors.size();
+    for (std::size_t i = 0; i < factors; ++i) {
+      const Factor& factor = state.model.terms[t].blocks.front().basis.factors[i];
+      if (factor.shape == Shape::kTable && !factor.known.empty()) refit_table(fitter, state, t, i);
+    }
+  }
 }
 
 }  // namespace kilotwin::identify

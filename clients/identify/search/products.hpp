@@ -52,4 +52,8 @@ class ProductFit {
 /// Returns whether it did.
 bool separate(const Fitter&, FitState&, std::size_t term);
 
+/// Fits the tables of all products anew, with a value for each robot of the tracks: of a model that was fitted to a part of them. A
+/// product that becomes less likely stays as it was.
+void refit_tables(const Fitter&, FitState&);
+
 }  // namespace kilotwin::identify

@@ -51,7 +51,7 @@ constexpr std::size_t kEnoughSamples = 130000;
 constexpr std::size_t kEnoughForGeneral = 70000;
 /// General terms that are tried in one round.
 constexpr std::size_t kMostTries = 4;
-/// What a search tries. An attempt that failed is not repeated.
+/// An attempt of the search. One that failed is not repeated.
 struct Attempt {
   enum class Kind : std::uint8_t {
     kNamed,       ///< a hypothesis with a named form

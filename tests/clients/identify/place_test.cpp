@@ -10,6 +10,7 @@
 #include "clients/identify/model/effect_records.hpp"
 #include "clients/identify/model/model_file.hpp"
 #include "clients/identify/search/neighbour_shape.hpp"
+#include "clients/identify/search/products.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
 #include "clients/identify/search/standing_circles.hpp"
 #include "clients/identify/search/total_variation_map.hpp"
@@ -217,6 +218,35 @@ TEST(Place, ASlopeOfTheFloorIsNoCircle) {
   replace_maps_by_circles(fitter, found);
   EXPECT_FALSE(found.with_maps);
   EXPECT_EQ(proto_of(found.fit.model).SerializeAsString(), before);
+}
+
+TEST(Place, TablesOfProductsGetTheValuesOfAllRobots) {
+  // Robots with even numbers are slow on one side. The model was fitted without robots 4 and 5, and takes them for slow.
+  const MeasuredSet set =
+      played([](const Around& a) { return a.robot % 2 == 0 && a.x_mm[a.robot] > 0 ? 0.5 : 1.0; }, 12, 8, 300);
+  const Fitter fitter(set, 2);
+  FitState state = fitted(fitter, set);
+  Factor table, side;
+  table.shape = Shape::kTable;
+  table.axis.of = Covariate::kRobot;
+  table.points = {0, 1, 2, 3, 6, 7};
+  table.known = {1, -1, 1, -1, 1, -1};
+  table.plus = 1;
+  side.shape = Shape::kAtLeast;
+  side.axis.of = Covariate::kX;
+  side.points = {0};
+  Term term = unfitted(side);
+  term.blocks.front().basis.factors.insert(term.blocks.front().basis.factors.begin(), table);
+  state.model.terms.push_back(term);
+  fitter.fit(state, 2);
+  refit_tables(fitter, state);
+  const auto gain = [&](std::uint32_t robot, double x_mm) {
+    Situation s = driven_at(x_mm, 0);
+    s.robot = robot;
+    return gain_of(state.model, s);
+  };
+  for (std::uint32_t robot = 0; robot < 8; ++robot)
+    EXPECT_NEAR(gain(robot, 60) / gain(robot, -60), robot % 2 == 0 ? 0.5 : 1, 0.06) << robot;
 }
 
 TEST(Place, TheNeighbourhoodRadiusIsRecovered) {
