@@ -192,10 +192,23 @@ void choose(Findings& f, const Fitter& fitter, const MeasuredSet& train, const M
   if (f.found.fit.model.terms.empty() && f.found.fit.model.base.command_lag_s == 0) f.base = f.found.fit;
 }
 
-/// Stalls, and the noise beside them.
-void add_stalls(Findings& f, const Fitter& fitter) {
-  f.stalls = find_stalls(fitter, f.found.fit);
-  if (f.stalls) set_noise(f, fitter);
+/// Stalls, and the noise beside them. Stalls beside which the tracks of the fit, `fitted`, are predicted clearly worse are not written:
+/// the mean speed includes them already.
+void add_stalls(Findings& f, const Fitter& fitter, const MeasuredSet& fitted, const ForecastTimes& times) {
+  constexpr double kClearlyWorse = 1.02;
+  FitState with = f.found.fit;
+  f.stalls = find_stalls(fitter, with);
+  if (!f.stalls) return;
+  const auto error_mm = [&](const FitState& state) {
+    return errors_of(fitted, forecast(state.model, state.tracks, times, Tracks::kFit, fitter.threads())).rmse_mm();
+  };
+  // Negated, so that an error that is no number is no reason to write them.
+  if (!(error_mm(with) <= kClearlyWorse * error_mm(f.found.fit))) {
+    f.stalls.reset();
+    return;
+  }
+  f.found.fit = std::move(with);
+  set_noise(f, fitter);
 }
 
 /// The errors that are reported.
@@ -252,7 +265,7 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   for (Run& run : all_fitted.runs)
     for (Track& track : run.tracks) track.held_out = track.chooses = false;
   choose(f, fitter, train, test != nullptr ? all_fitted : train, evaluation, reported);
-  if (options.find_effects) add_stalls(f, fitter);
+  if (options.find_effects) add_stalls(f, fitter, test != nullptr ? all_fitted : train, reported);
   begin(kErrors, "prediction errors");
   judge(f, fitter, evaluation, reported);
   begin(kUnexplained, "what is left unexplained");

@@ -150,12 +150,9 @@ std::string battery_result(const Scene& scene, const std::string& covariate, dou
                                {"straight_speed_mm_s", 0.9 * scene.straight_mm_s},
                                {"turn_speed_mm_s", 0.9 * scene.turn_mm_s},
                                {"bias_mean_mm_s", 0.9 * scene.bias_mean_mm_s}};
-  const nlohmann::json sd = {{"wheel_base_mm", 0.1},
-                             {"tracked_point_ahead_mm", 0.1},
-                             {"tracked_point_left_mm", 0.1},
-                             {"straight_speed_mm_s", 0.01},
-                             {"turn_speed_mm_s", 0.01},
-                             {"bias_mean_mm_s", 0.01}};
+  const nlohmann::json sd = {{"wheel_base_mm", 0.1},         {"tracked_point_ahead_mm", 0.1},
+                             {"tracked_point_left_mm", 0.1}, {"straight_speed_mm_s", 0.01},
+                             {"turn_speed_mm_s", 0.01},      {"bias_mean_mm_s", 0.01}};
   const nlohmann::json low = {
       {"tracker_position_sd_mm", 0}, {"tracker_heading_sd_rad", 0}, {"factor_variance_s", 0}};
   const nlohmann::json high = {

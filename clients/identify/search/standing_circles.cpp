@@ -293,7 +293,10 @@ FitState with_edges(const Fitter& fitter, FitState state, std::size_t place, con
   Term& term = state.model.terms[place];
   const auto circles = static_cast<Eigen::Index>(term.blocks.size());
   for (Eigen::Index b = 0; b < circles; ++b) {
-    Factor& edge = curve_of(term.blocks[static_cast<std::size_t>(b)]);
+    Block& block = term.blocks[static_cast<std::size_t>(b)];
+    // The columns that are left of the curve.
+    block.basis.chosen.clear();
+    Factor& edge = curve_of(block);
     edge.shape = Shape::kAtLeast;
     edge.points = {radii_mm[static_cast<std::size_t>(b)]};
   }
