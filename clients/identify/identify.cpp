@@ -204,6 +204,12 @@ void add_stalls(Findings& f, const Fitter& fitter, const MeasuredSet& fitted, co
   };
   // Negated, so that an error that is no number is no reason to write them.
   if (!(error_mm(with) <= kClearlyWorse * error_mm(f.found.fit))) {
+    f.found.rejected.insert(f.found.rejected.begin(), {"stalls",
+                                                       {"episodes"},
+                                                       "wheel speed",
+                                                       f.stalls->log10_p,
+                                                       kStallThreshold_log10_p,
+                                                       "the tracks of the fit are predicted worse with it"});
     f.stalls.reset();
     return;
   }

@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::size_t kFewestSpells = 5;
 /// As of effects on the noise.
-constexpr double kStallThreshold_log10_p = -5, kLeastStallGain = 10, kLeastStallErrors = 3;
+constexpr double kLeastStallGain = 10, kLeastStallErrors = 3;
 constexpr std::size_t kRobotFolds = 6;
 /// Heavy tails of the noise make robots faster as often as slower. Spells of a higher speed must gain less than this share.
 constexpr double kMostMirrored = 0.5;

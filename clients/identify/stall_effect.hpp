@@ -11,6 +11,9 @@
 
 namespace kilotwin::identify {
 
+/// As of effects on the noise.
+inline constexpr double kStallThreshold_log10_p = -5;
+
 struct StallEffect {
   Stalls stalls;
   std::size_t spells = 0;     ///< in the tracks of the fit
