@@ -26,6 +26,8 @@ constexpr double kLeastShare = 0.03;
 /// Circles have far fewer numbers than the map: the loss of log likelihood that they may have, absolute and as a share of what the
 /// map explains. A map with sharp edges follows chance by some percent.
 constexpr double kLoss = 10, kLossShare = 0.05;
+/// The share of the map's gain that n circles have to reach over n, or no further one is tried.
+constexpr double kLeastOfEach = 0.25;
 /// Prior standard deviation of the coefficients before their first fit: of gains, or of rad/s.
 constexpr double kPriorSd = 0.3;
 /// Log of the number of choices for one number of a circle.
@@ -334,10 +336,10 @@ bool replace_by_circles(const Fitter& fitter, FitState& state, std::size_t place
   const auto at = circles.model.terms.begin() + static_cast<std::ptrdiff_t>(place);
   circles.model.terms.erase(at);
   settle(fitter, circles);
-  const double had = fitter.log_likelihood(state),
-               least = had - kLoss - kLossShare * (had - fitter.log_likelihood(circles));
+  const double had = fitter.log_likelihood(state), without = fitter.log_likelihood(circles),
+               least = had - kLoss - kLossShare * (had - without);
   std::optional<FitState> best;
-  double most = -INFINITY;
+  double most = -INFINITY, reached = -INFINITY;
   for (std::size_t n = 1; n <= kMostCircles; ++n) {
     const std::optional<Disc> disc =
         next_disc(map, n == 1 ? nullptr : &circles.model.terms[place], *target, extent, all);
@@ -349,15 +351,18 @@ bool replace_by_circles(const Fitter& fitter, FitState& state, std::size_t place
     if (!lies_within(circles.model.terms[place], extent)) break;
     const double numbers = kPerNumber * 3 * static_cast<double>(n);
     const auto better = [&](const FitState& trial) {
-      const double value = fitter.log_evidence(trial) - numbers;
+      const double value = fitter.log_evidence(trial) - numbers, likelihood = fitter.log_likelihood(trial);
+      reached = std::max(reached, likelihood);
       // Negated, so that a likelihood that is no number is not better.
-      if (!(fitter.log_likelihood(trial) > least) || !(value > most)) return;
+      if (!(likelihood > least) || !(value > most)) return;
       most = value;
       best = trial;
     };
     better(circles);
     const std::vector<double> radii_mm = radii_of(map, circles.model.terms[place], *target, extent);
     better(with_edges(fitter, circles, place, radii_mm));
+    // So few circles will not do.
+    if (!(reached - without > kLeastOfEach * static_cast<double>(n) * (had - without))) break;
   }
   if (!best) return false;
   state = std::move(*best);
