@@ -8,13 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "clients/identify/fit/likelihood.hpp"
-#include "clients/identify/fit/spell_filter.hpp"
+#include "clients/identify/fit/spell_scan.hpp"
 #include "clients/identify/model/model_file.hpp"
 #include "clients/identify/result/values.hpp"
-#include "core/os/worker_pool.hpp"
 #include "core/stats/distributions.hpp"
-#include "core/stats/quantiles.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -25,83 +22,11 @@ constexpr double kLeastStallGain = 10, kLeastStallErrors = 3;
 constexpr std::size_t kRobotFolds = 6;
 /// Heavy tails of the noise make robots faster as often as slower. Spells of a higher speed must gain less than this share.
 constexpr double kMostMirrored = 0.5;
+/// Random spells of different robots are independent, which gives a dispersion of 1. Robots that are slow together show an effect that the
+/// model lacks.
+constexpr double kMostDispersion = 2;
 /// Mean time apart, number, scale and tail of durations; and the speed within, if it is not zero.
 constexpr std::uint32_t kDegrees = 3;
-
-/// The tracks of the fit with spells, and without.
-class SpellScan {
- public:
-  SpellScan(const FitState& state, std::uint32_t threads) : views_(state.tracks.views()), threads_(threads) {
-    plain_.assign(views_.size(), 0);
-    os::in_parallel(views_.size(), threads_, [&](std::size_t v) {
-      if (!views_[v].track->held_out) plain_[v] = likelihood_of(state.model, views_[v]).sum;
-    });
-    std::vector<double> lengths_s;
-    for (const TrackView& view : views_) {
-      const std::vector<Sample>& samples = view.track->samples;
-      longest_s_ = std::max(longest_s_, samples.back().time_s - samples.front().time_s);
-      lengths_s.push_back((samples.back().time_s - samples.front().time_s) /
-                          static_cast<double>(samples.size() - 1));
-    }
-    least_s_ = stats::upper_median(lengths_s) / 2;
-  }
-
-  struct Found {
-    std::vector<TrackSpells> tracks;  ///< by view; empty for held-out ones
-    std::vector<double> gains;        ///< of the log likelihood, by view
-    std::size_t spells = 0;
-    double gain = 0;
-  };
-  /// `stalls_of(v)`: those of the view v.
-  template <class Of> [[nodiscard]] Found scan_by(const MotionModel& model, Of&& stalls_of) const {
-    Found out;
-    out.tracks.resize(views_.size());
-    out.gains.assign(views_.size(), 0);
-    os::in_parallel(views_.size(), threads_, [&](std::size_t v) {
-      if (views_[v].track->held_out) return;
-      MotionModel with = model;
-      with.stalls = stalls_of(v);
-      out.tracks[v] = spells_of(with, views_[v]);
-      out.gains[v] = out.tracks[v].log_likelihood - plain_[v];
-    });
-    for (std::size_t v = 0; v < views_.size(); ++v) {
-      out.spells += out.tracks[v].spells.size();
-      out.gain += out.gains[v];
-    }
-    return out;
-  }
-  [[nodiscard]] Found scan(const MotionModel& model, const Stalls& stalls) const {
-    return scan_by(model, [&](std::size_t) { return stalls; });
-  }
-  /// The parameters of maximum likelihood by the spells of the views that `use` picks.
-  template <class Use> [[nodiscard]] Stalls refined(const Found& found, Stalls stalls, Use&& use) const {
-    std::vector<Spell> spells;
-    double between_s = 0, starts = 0;
-    for (std::size_t v = 0; v < found.tracks.size(); ++v) {
-      if (!use(v)) continue;
-      between_s += found.tracks[v].between_s;
-      for (const Spell& spell : found.tracks[v].spells) {
-        spells.push_back(spell);
-        starts += spell.start_s > views_[v].track->samples.front().time_s ? 1 : 0;
-      }
-    }
-    stalls.longest_s = longest_s_;
-    fit_lengths(spells, least_s_, stalls);
-    // Short spells are not seen.
-    stalls.mean_apart_s = std::max(1.0, between_s * stalls.survival(least_s_) / std::max(starts, 0.5));
-    return stalls;
-  }
-  [[nodiscard]] Stalls refined(const Found& found, const Stalls& stalls) const {
-    return refined(found, stalls, [](std::size_t) { return true; });
-  }
-  [[nodiscard]] const std::vector<TrackView>& views() const { return views_; }
-
- private:
-  const std::vector<TrackView> views_;
-  const std::uint32_t threads_;
-  std::vector<double> plain_;  ///< log likelihood without spells, by view
-  double longest_s_ = 0, least_s_ = 0;
-};
 
 /// Stalls with parameters fitted at this speed within spells, and their gain. Without enough spells: no gain.
 std::pair<Stalls, double> first_fit(const SpellScan& scan, const MotionModel& model, double speed) {
@@ -164,7 +89,7 @@ std::pair<double, double> cross_validated(const SpellScan& scan, const SpellScan
   std::vector<Stalls> without;
   for (std::size_t k = 0; k < kRobotFolds; ++k)
     without.push_back(scan.refined(found, *state.model.stalls, [&](std::size_t v) { return fold_of(v) != k; }));
-  const SpellScan::Found judged = scan.scan_by(state.model, [&](std::size_t v) { return without[fold_of(v)]; });
+  const SpellScan::Found judged = scan.scan(state.model, [&](std::size_t v) { return without[fold_of(v)]; });
   double tracks = 0, squares = 0;
   for (const TrackView& view : scan.views()) tracks += view.track->held_out ? 0 : 1;
   for (std::size_t v = 0; v < scan.views().size(); ++v)
@@ -192,6 +117,7 @@ std::optional<StallEffect> find_stalls(const Fitter& fitter, FitState& state) {
   out.degrees = kDegrees + (out.stalls.gain > 0 ? 1 : 0);
   out.log10_p = stats::log10_chi_squared_tail(2 * std::max(0.0, out.gain), out.degrees);
   std::tie(out.held_out, out.held_out_se) = cross_validated(scan, found, trial);
+  if (scan.dispersion(found) > kMostDispersion) return std::nullopt;
   if (out.spells < kFewestSpells || !(out.log10_p < kStallThreshold_log10_p) || !(out.held_out > kLeastStallGain) ||
       !(out.held_out > kLeastStallErrors * out.held_out_se))
     return std::nullopt;

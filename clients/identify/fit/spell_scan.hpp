@@ -1,0 +1,43 @@
+/// Spells of all tracks of the fit (spell_filter.hpp), the stalls of maximum likelihood, and whether robots stall together.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "clients/identify/fit/fit_state.hpp"
+#include "clients/identify/fit/spell_filter.hpp"
+
+namespace kilotwin::identify {
+
+/// The tracks of the fit with spells, and without.
+class SpellScan {
+ public:
+  SpellScan(const FitState&, std::uint32_t threads);
+
+  struct Found {
+    std::vector<TrackSpells> tracks;  ///< by view; empty for held-out ones
+    std::vector<double> gains;        ///< of the log likelihood, by view
+    std::size_t spells = 0;
+    double gain = 0;
+  };
+  /// `stalls_of(v)`: those of the view v.
+  [[nodiscard]] Found scan(const MotionModel&, const std::function<Stalls(std::size_t)>& stalls_of) const;
+  [[nodiscard]] Found scan(const MotionModel&, const Stalls&) const;
+  /// The parameters of maximum likelihood by the spells of the views that `use` picks.
+  [[nodiscard]] Stalls refined(const Found&, Stalls, const std::function<bool(std::size_t)>& use) const;
+  [[nodiscard]] Stalls refined(const Found&, const Stalls&) const;
+  /// Mean square deviation of the number of robots in a spell from its mean, over that of independent robots with the same share of
+  /// time in spells: 1 for independent robots, up to their number if all stall together. Without two robots in a run: 1.
+  [[nodiscard]] double dispersion(const Found&) const;
+  [[nodiscard]] const std::vector<TrackView>& views() const { return views_; }
+
+ private:
+  const std::vector<TrackView> views_;
+  const std::uint32_t threads_;
+  std::vector<double> plain_;  ///< log likelihood without spells, by view
+  double longest_s_ = 0, least_s_ = 0;
+};
+
+}  // namespace kilotwin::identify
