@@ -245,8 +245,15 @@ TEST(Place, TablesOfProductsGetTheValuesOfAllRobots) {
     s.robot = robot;
     return gain_of(state.model, s);
   };
+  // Robot 4 never gets there: it has the mean of the seven others.
+  for (const Sample& sample : set.runs[0].tracks[4].samples) ASSERT_LT(sample.x_mm, 0);
   for (std::uint32_t robot = 0; robot < 8; ++robot)
-    EXPECT_NEAR(gain(robot, 60) / gain(robot, -60), robot % 2 == 0 ? 0.5 : 1, 0.06) << robot;
+    EXPECT_NEAR(gain(robot, 60) / gain(robot, -60),
+                robot == 4       ? 1 - 0.5 * 3 / 7
+                : robot % 2 == 0 ? 0.5
+                                 : 1,
+                0.06)
+        << robot;
 }
 
 TEST(Place, TheNeighbourhoodRadiusIsRecovered) {
