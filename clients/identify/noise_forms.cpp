@@ -133,13 +133,18 @@ struct NeighbourCurve {
   Axis axis;
   double least, most;
 
+  /// The value at which 1 / e of the rise of sums over neighbours is left.
+  [[nodiscard]] double level() const { return std::max(1.0, most / 4); }
   /// Share of the range. Sums over neighbours level off, since few samples have many neighbours.
   [[nodiscard]] double share(double value) const {
     const double v = std::clamp(value, least, most);
-    return axis.of == Covariate::kNearest ? (v - least) / (most - least) : std::expm1(-v) / std::expm1(-most);
+    return axis.of == Covariate::kNearest ? (v - least) / (most - least)
+                                          : std::expm1(-v / level()) / std::expm1(-most / level());
   }
   [[nodiscard]] double at_share(double share) const {
-    return axis.of == Covariate::kNearest ? least + share * (most - least) : -std::log1p(share * std::expm1(-most));
+    if (share >= 1) return most;
+    return axis.of == Covariate::kNearest ? least + share * (most - least)
+                                          : -level() * std::log1p(share * std::expm1(-most / level()));
   }
   [[nodiscard]] Eigen::RowVectorXd row(double value) const {
     constexpr int kOrder = 3;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -46,13 +47,16 @@ double fitted_speed(const SpellScan& scan, const MotionModel& model, Stalls stal
     stalls.gain = speed;
     return scan.scan(model, stalls).gain;
   };
+  constexpr int kMostMoves = 30;
   double best = stalls.gain, gain = value(best);
-  for (double step = kFirst; step >= kLast;) {
+  int moves = 0;
+  for (double step = kFirst; step >= kLast && moves < kMostMoves; ++moves) {
     bool moved = false;
     for (const double to : {best - step, best + step}) {
       if (to < 0 || to > kMost) continue;
       const double found = value(to);
-      if (found <= gain) continue;
+      // Negated, so that a likelihood that is no number is no gain.
+      if (!(found > gain)) continue;
       gain = found;
       best = to;
       moved = true;
@@ -81,11 +85,20 @@ SpellScan::Found refit(const SpellScan& scan, const Fitter& fitter, SpellScan::F
 /// The gain on robots whose spells take no part in the parameters of the stalls, and its standard error over tracks.
 std::pair<double, double> cross_validated(const SpellScan& scan, const SpellScan::Found& found,
                                           const FitState& state) {
-  std::map<std::uint32_t, std::size_t> fold;
-  for (const TrackView& view : scan.views()) fold.emplace(view.track->robot, 0);
+  // Of the robots of the fit; of its tracks, if there are few robots.
+  std::set<std::uint32_t> robots;
+  for (const TrackView& view : scan.views())
+    if (!view.track->held_out) robots.insert(view.track->robot);
+  const bool by_robot = robots.size() >= kRobotFolds;
+  std::map<std::size_t, std::size_t> folds;  // by robot or view
+  const auto key_of = [&](std::size_t v) { return by_robot ? scan.views()[v].track->robot : v; };
   std::size_t next = 0;
-  for (auto& [robot, at] : fold) at = next++ % kRobotFolds;
-  const auto fold_of = [&](std::size_t v) { return fold.at(scan.views()[v].track->robot); };
+  for (std::size_t v = 0; v < scan.views().size(); ++v)
+    if (!scan.views()[v].track->held_out && folds.try_emplace(key_of(v), next % kRobotFolds).second) ++next;
+  const auto fold_of = [&](std::size_t v) {
+    const auto at = folds.find(key_of(v));
+    return at == folds.end() ? 0 : at->second;
+  };
   std::vector<Stalls> without;
   for (std::size_t k = 0; k < kRobotFolds; ++k)
     without.push_back(scan.refined(found, *state.model.stalls, [&](std::size_t v) { return fold_of(v) != k; }));

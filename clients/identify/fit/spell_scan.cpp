@@ -60,10 +60,12 @@ Stalls SpellScan::refined(const Found& found, Stalls stalls, const std::function
       starts += spell.start_s > views_[v].track->samples.front().time_s ? 1 : 0;
     }
   }
-  stalls.longest_s = longest_s_;
+  // Beyond what any track shows.
+  stalls.longest_s = 2 * longest_s_;
   fit_lengths(spells, least_s_, stalls);
   // Short spells are not seen.
-  stalls.mean_apart_s = std::max(1.0, between_s * stalls.survival(least_s_) / std::max(starts, 0.5));
+  if (between_s > 0)
+    stalls.mean_apart_s = std::max(1.0, between_s * stalls.survival(least_s_) / std::max(starts, 0.5));
   return stalls;
 }
 

@@ -638,10 +638,15 @@ bool is_same_table(const Factor& a, const Factor& b) {
 void refit_table(const Fitter& fitter, FitState& state, std::size_t t, std::size_t place) {
   Term kept = state.model.terms[t];
   std::vector<Factor> functions = functions_of(kept);
-  const Factor old = kept.blocks.front().basis.factors[place];
-  const auto at =
-      std::find_if(functions.begin(), functions.end(), [&](const Factor& f) { return is_same_table(f, old); });
-  if (at == functions.end()) return;
+  const std::vector<Factor> factors = kept.blocks.front().basis.factors;
+  const Factor& old = factors[place];
+  // Known factors come first, in their order.
+  const auto known = [](const Factor& f) { return !f.known.empty(); };
+  const auto at = functions.begin() +
+                  std::count_if(factors.begin(), factors.begin() + static_cast<std::ptrdiff_t>(place), known);
+  if (at >= functions.end() || at->shape != Shape::kTable) return;
+  // Without an open function the last one has the coefficient of the term.
+  const bool has_coefficient = at + 1 == functions.end();
   std::rotate(at, at + 1, functions.end());
   double unit = 1;
   for (std::size_t i = 0; i + 1 < functions.size(); ++i) {
@@ -661,6 +666,10 @@ void refit_table(const Fitter& fitter, FitState& state, std::size_t t, std::size
   for (Block& block : kept.blocks)
     for (Factor& factor : block.basis.factors)
       if (is_same_table(factor, old)) factor = *table;
+  if (has_coefficient) {
+    kept.precision *= kept.coefficients[0] * kept.coefficients[0];
+    kept.coefficients.setOnes();
+  }
   about_the_mean(kept);
   trial.model.terms[t] = std::move(kept);
   fitter.fit(trial, 2);

@@ -135,7 +135,8 @@ Disc best_disc(const std::vector<MapPoint>& points, const Extent& e) {
   double most = -1;
   const auto better = [&](const Disc& disc) {
     const double explained = contrast_of(points, disc).explained;
-    if (explained <= most) return false;
+    // Negated, so that a share that is no number is not better.
+    if (!(explained > most)) return false;
     most = explained;
     best = disc;
     return true;
@@ -186,7 +187,7 @@ std::vector<double> radii_of(const std::vector<MapPoint>& map, const Term& circl
     for (int i = 1; i <= kRadii; ++i) {
       const Disc disc{centre.x_mm, centre.y_mm, side * i / kRadii};
       const double explained = contrast_of(left, disc).explained;
-      if (explained <= most) continue;
+      if (!(explained > most)) continue;
       most = explained;
       radius_mm = disc.radius_mm;
     }
@@ -349,7 +350,7 @@ bool replace_by_circles(const Fitter& fitter, FitState& state, std::size_t place
                                  Term{state.model.terms[place].name, {}, {}, {}});
     add_curve(fitter, circles, place, *target, *disc);
     if (!lies_within(circles.model.terms[place], extent)) break;
-    const double numbers = kPerNumber * 3 * static_cast<double>(n);
+    const double numbers = kPerNumber * 3 * static_cast<double>(circles.model.terms[place].blocks.size());
     const auto better = [&](const FitState& trial) {
       const double value = fitter.log_evidence(trial) - numbers, likelihood = fitter.log_likelihood(trial);
       reached = std::max(reached, likelihood);
