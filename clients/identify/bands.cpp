@@ -70,14 +70,18 @@ class TermBand {
     band.low = std::min(band.low, by.low);
     band.high = std::max(band.high, by.high);
   }
-  /// Moves the places that lie within the interval of a step. Returns whether there are any.
+  /// Moves the places of factors with a step that lie within its interval. Returns whether there are any.
   [[nodiscard]] bool move_within(std::vector<BlockPlace>& places, const StepInterval& step, double to) const {
     bool any = false;
     for (BlockPlace& place : places) {
       const std::vector<Factor>& factors = term_.blocks[place.block].basis.factors;
       for (std::size_t f = 0; f < factors.size(); ++f) {
         double& value = place.factors[f].value;
-        if (!(factors[f].axis == step.axis) || value < *step.low || value > *step.high) continue;
+        const std::vector<double>& steps = factors[f].points;
+        if (factors[f].shape != Shape::kAtLeast || !(factors[f].axis == step.axis) ||
+            std::find(steps.begin(), steps.end(), step.at) == steps.end() || value < *step.low ||
+            value > *step.high)
+          continue;
         value = to;
         any = true;
       }

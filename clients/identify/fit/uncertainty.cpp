@@ -146,7 +146,7 @@ Uncertainty uncertainty_of(const Fitter& fitter, const FitState& state) {
   Eigen::MatrixXd by_parameter = Eigen::MatrixXd::Zero(columns, parameters);
   by_parameter.topLeftCorner(n, n).setIdentity();
   by_parameter.bottomRightCorner(columns - n, parameters - n) = out.held.columns.weights;
-  if (columns > n)
+  if (parameters > n)
     for (Unit& unit : units) unit = in_parameters(unit, by_parameter);
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(parameters, parameters);
   for (const Unit& unit : units) information += unit.information;
