@@ -26,8 +26,9 @@ constexpr double kLeastShare = 0.03;
 /// Circles have far fewer numbers than the map: the loss of log likelihood that they may have, absolute and as a share of what the
 /// map explains. A map with sharp edges follows chance by some percent.
 constexpr double kLoss = 10, kLossShare = 0.05;
-/// The share of the map's gain that n circles have to reach over n, or no further one is tried.
-constexpr double kLeastOfEach = 0.25;
+/// The share of the map's gain that n circles have to reach over n, or no further one is tried; and that of their curves, or no edges
+/// are tried.
+constexpr double kLeastOfEach = 0.25, kLeastCurves = 0.15;
 /// Prior standard deviation of the coefficients before their first fit: of gains, or of rad/s.
 constexpr double kPriorSd = 0.3;
 /// Log of the number of choices for one number of a circle.
@@ -360,6 +361,8 @@ bool replace_by_circles(const Fitter& fitter, FitState& state, std::size_t place
       best = trial;
     };
     better(circles);
+    // Curves reach most of what edges reach.
+    if (!(reached - without > kLeastCurves * static_cast<double>(n) * (had - without))) break;
     const std::vector<double> radii_mm = radii_of(map, circles.model.terms[place], *target, extent);
     better(with_edges(fitter, circles, place, radii_mm));
     // So few circles will not do.
