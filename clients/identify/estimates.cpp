@@ -71,7 +71,13 @@ std::vector<Estimate> estimates_of(std::size_t term, const Uncertainty& u, const
     const HeldNumber& number = u.held.numbers[static_cast<std::size_t>(i)];
     if (number.term != term || number.name.empty()) continue;
     const bool amplitude = number.name.starts_with(kAmplitude);
-    (amplitude ? amplitudes : out).push_back(with_sd(number.name, number.unit, number.value, u.sd(first + i)));
+    Estimate one = with_sd(number.name, number.unit, number.value, u.sd(first + i));
+    if (number.is_open(u.sd(first + i))) {
+      one.clear_low();
+      one.clear_high();
+      one.set_how("no interval: these data leave it open");
+    }
+    (amplitude ? amplitudes : out).push_back(std::move(one));
     const auto next = static_cast<std::size_t>(i) + 1;
     if (number.name == "wave number y")
       add_wave(out, u, i - 1, next < u.held.numbers.size() && u.held.numbers[next].name == "angular frequency");

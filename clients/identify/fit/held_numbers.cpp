@@ -246,9 +246,10 @@ class Collector {
           to_.columns.add(std::move(part.block), one.index, at, part.weight * sign / (2 * number.step));
       }
     }
-    to_.numbers.push_back({t, number.name, number.unit, number.value});
-    constexpr double kFarthest = 1e4;  // steps: a number that the data leave open has a finite variance
-    priors_.emplace_back(at, Eigen::MatrixXd::Constant(1, 1, 1 / std::pow(kFarthest * number.step, 2)));
+    constexpr double kFarthest = 1e4;  // steps
+    const double farthest = kFarthest * number.step;
+    to_.numbers.push_back({t, number.name, number.unit, number.value, farthest});
+    priors_.emplace_back(at, Eigen::MatrixXd::Constant(1, 1, 1 / (farthest * farthest)));
   }
 
   HeldNumbers& to_;

@@ -38,6 +38,11 @@ struct HeldNumber {
   std::string name;  ///< of numbers that are reported; empty: a coefficient or a node
   std::string unit = {};
   double value = 0;
+  double farthest =
+      0;  ///< standard deviation of its prior, which only keeps the variance finite; 0: the prior has a meaning
+
+  /// Whether the data leave it open: its standard deviation is that of the prior.
+  [[nodiscard]] bool is_open(double sd) const { return farthest > 0 && sd > farthest / 2; }
 };
 
 /// Nodes along each axis of the deviation from a map with fixed values: its values are known as means over about one cell.

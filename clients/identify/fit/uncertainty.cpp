@@ -12,7 +12,7 @@ namespace kilotwin::identify {
 namespace {
 
 /// Variance of the scores of clusters over what the information expects; 1 or more. Few clusters do not tell it. `covariance`: of the
-/// first parameters.
+/// first columns.
 double dispersion_of(const std::vector<Unit>& units, const Eigen::MatrixXd& covariance) {
   constexpr Eigen::Index kFewest = 40;
   Eigen::Index clusters = 0;
@@ -45,17 +45,6 @@ Eigen::MatrixXd with_bias_mean(const std::vector<Unit>& units, const Eigen::Matr
     out(n, n) += 2 * precision - precision * precision * ones.dot(unit.bias_covariance * ones);
   }
   out.row(n).head(n) = out.col(n).head(n).transpose();
-  return out;
-}
-
-/// The information of other parameters, of which the columns are weighted sums.
-Unit in_parameters(const Unit& unit, const Eigen::MatrixXd& by_parameter) {
-  Unit out;
-  out.robot = unit.robot;
-  out.information = by_parameter.transpose() * unit.information * by_parameter;
-  out.cluster_scores = by_parameter.transpose() * unit.cluster_scores;
-  out.bias_covariance = unit.bias_covariance;
-  out.bias_by_column = unit.bias_by_column * by_parameter;
   return out;
 }
 
@@ -146,10 +135,12 @@ Uncertainty uncertainty_of(const Fitter& fitter, const FitState& state) {
   Eigen::MatrixXd by_parameter = Eigen::MatrixXd::Zero(columns, parameters);
   by_parameter.topLeftCorner(n, n).setIdentity();
   by_parameter.bottomRightCorner(columns - n, parameters - n) = out.held.columns.weights;
-  if (parameters > n)
-    for (Unit& unit : units) unit = in_parameters(unit, by_parameter);
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(parameters, parameters);
-  for (const Unit& unit : units) information += unit.information;
+  Eigen::MatrixXd of_columns = Eigen::MatrixXd::Zero(columns, columns);
+  for (Unit& unit : units) {
+    of_columns += unit.information;
+    unit.bias_by_column = (unit.bias_by_column * by_parameter).eval();
+  }
+  Eigen::MatrixXd information = by_parameter.transpose() * of_columns * by_parameter;
   add_priors(fitter, state, information, n);
   information.bottomRightCorner(parameters - n, parameters - n) += out.held.precision;
   const double bias_precision = 1 / (model.base.bias_sd_mm_s * model.base.bias_sd_mm_s);

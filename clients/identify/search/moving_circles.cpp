@@ -1,13 +1,12 @@
 #include "clients/identify/search/moving_circles.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
 
 #include "clients/identify/search/dictionary_builder.hpp"
-#include "clients/identify/search/local_quadratic.hpp"
+#include "clients/identify/search/number_steps.hpp"
 #include "clients/identify/search/visits.hpp"
 #include "core/os/worker_pool.hpp"
 
@@ -141,7 +140,7 @@ void set_centre(Term& term, const MovingPoint& centre) {
       if (f.axis.of == Covariate::kPointDistance) f.axis.point = centre;
 }
 
-MovingPoint shifted_centre(MovingPoint p, const Eigen::Matrix<double, 5, 1>& step_mm, double unit_s) {
+MovingPoint shifted_centre(MovingPoint p, const Eigen::VectorXd& step_mm, double unit_s) {
   p.x_mm += step_mm[0];
   p.y_mm += step_mm[1];
   p.velocity_x_mm_s += step_mm[2] / unit_s;
@@ -200,7 +199,7 @@ Block derivatives_of(const Term& term, std::size_t of_block, double unit_s) {
     shift.points[block.basis.chosen.empty() ? i : block.basis.chosen[i]] =
         term.coefficients[first + static_cast<Eigen::Index>(i)];
   shift.shape = Factor::Shape::kPointShift;
-  shift.count = static_cast<std::uint32_t>(std::max(1.0, std::round(unit_s)));
+  shift.count = static_cast<std::uint32_t>(unit_s);
   return {block.target, Basis{{shift}}, block.during};
 }
 
@@ -265,35 +264,19 @@ bool is_moving_circle(const Term& term) {
 }
 
 bool refine_moving_circle(const Fitter& fitter, FitState& state, std::size_t place) {
-  constexpr int kMostPasses = 6;
-  constexpr double kSettled = 1, kLargestStep_mm = 60;
   if (!is_moving_circle(state.model.terms[place])) return false;
-  const double duration_s = extent_of(state.tracks).duration_s;
-  bool changed = false;
+  const double unit_s = std::max(1.0, std::round(extent_of(state.tracks).duration_s));
+  NumberSteps steps;
+  steps.slopes = [&](const FitState& now) {
+    return std::vector<Block>{derivatives_of(now.model.terms[place], 0, unit_s)};
+  };
+  steps.move = [&](FitState& trial, const Eigen::VectorXd& step_mm) {
+    Term& term = trial.model.terms[place];
+    set_centre(term, shifted_centre(term.blocks.front().basis.factors.front().axis.point, step_mm, unit_s));
+  };
+  steps.largest_step = 60;  // mm
   double likelihood = fitter.log_likelihood(state);
-  for (int pass = 0; pass < kMostPasses; ++pass) {
-    const Block slopes = derivatives_of(state.model.terms[place], 0, duration_s);
-    const LocalQuadratic l = local_quadratic(fitter, state, state.model.terms.size(), {slopes}, true);
-    Eigen::MatrixXd information = l.information;
-    information.diagonal() += l.prior;
-    information.diagonal().tail<5>().array() += 1 / (kLargestStep_mm * kLargestStep_mm);
-    const Eigen::Matrix<double, 5, 1> step = information.ldlt().solve(l.score).tail<5>();
-    bool better = false;
-    for (const double length : {1.0, 0.4, 0.16}) {
-      FitState trial = state;
-      const Factor& shift = slopes.basis.factors.front();
-      set_centre(trial.model.terms[place], shifted_centre(shift.axis.point, length * step, shift.count));
-      fitter.fit(trial, 2);
-      const double found = fitter.log_likelihood(trial);
-      // Negated, so that a likelihood that is no number is no progress.
-      if (!(found > likelihood + kSettled)) continue;
-      likelihood = found;
-      state = std::move(trial);
-      better = changed = true;
-      break;
-    }
-    if (!better) break;
-  }
+  bool changed = move_numbers(fitter, state, steps, likelihood);
   changed = set_still(fitter, state, place, likelihood) || changed;
   const MovingPoint& centre = state.model.terms[place].blocks.front().basis.factors.front().axis.point;
   const bool stands = centre.velocity_x_mm_s == 0 && centre.velocity_y_mm_s == 0 && centre.growth_mm_s == 0;

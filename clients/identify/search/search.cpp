@@ -157,8 +157,23 @@ class Loop {
   }
   /// A lag that was fitted before a term may have been off: refits it, and takes out what it explains then.
   void refit_lag() {
-    if (out_.fit.model.base.command_lag_s == 0 || fitter_.fit_command_lag(out_.fit) == 0) return;
+    if (out_.fit.model.base.command_lag_s == 0 || became_punctual() || fitter_.fit_command_lag(out_.fit) == 0)
+      return;
     for (std::size_t t = out_.fit.model.terms.size(); t-- > 0;) removed(t, false);
+  }
+  /// A term may be what looked like a lag, as speed does that builds up after a command: it may then explain more without one, and
+  /// the small steps of a refit don't reach lag 0. Returns whether the model has no lag now.
+  bool became_punctual() {
+    constexpr int kPasses = 4;
+    const Search before = out_;
+    const double evidence = fitter_.log_evidence(out_.fit);
+    out_.fit.model.base.command_lag_s = 0;
+    out_.fit.tracks.set_command_lag(0);
+    fitter_.fit(out_.fit, kPasses);
+    refine_shape(out_.fit.model.terms.size() - 1);
+    if (fitter_.log_evidence(out_.fit) > evidence - kClose) return true;
+    out_ = before;
+    return false;
   }
   void note_stage() { out_.path.push_back({out_.fit, out_.reasons}); }
   void say(WorkKind kind, std::string activity) const {

@@ -1,6 +1,5 @@
 #include "clients/identify/search/standing_circles.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "clients/identify/search/local_quadratic.hpp"
 #include "clients/identify/search/moving_circles.hpp"
+#include "clients/identify/search/number_steps.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
 
 namespace kilotwin::identify {
@@ -199,45 +198,30 @@ std::vector<double> radii_of(const std::vector<MapPoint>& map, const Term& circl
 
 Factor& curve_of(Block& block) { return block.basis.factors.front(); }
 
-/// Moves the centres of all circles by Gauss-Newton steps. Returns whether the likelihood rose.
+/// Moves the centres of all circles of a term. Returns whether the likelihood rose.
 bool move_centres(const Fitter& fitter, FitState& state, std::size_t place) {
-  constexpr int kMostMoves = 5;
-  constexpr double kLeastRise = 1, kLargestStep_mm = 40;
-  double likelihood = fitter.log_likelihood(state);
-  bool moved = false;
-  for (int pass = 0; pass < kMostMoves; ++pass) {
+  NumberSteps steps;
+  steps.slopes = [place](const FitState& now) {
     std::vector<Block> slopes;
-    for (std::size_t b = 0; b < state.model.terms[place].blocks.size(); ++b) {
-      slopes.push_back(derivatives_of(state.model.terms[place], b, 1));
+    for (std::size_t b = 0; b < now.model.terms[place].blocks.size(); ++b) {
+      slopes.push_back(derivatives_of(now.model.terms[place], b, 1));
       // The centre's place alone: the circle stands still.
       slopes.back().basis.chosen = {0, 1};
     }
-    const LocalQuadratic l = local_quadratic(fitter, state, state.model.terms.size(), slopes, true);
-    const auto n = static_cast<Eigen::Index>(2 * slopes.size());
-    Eigen::MatrixXd information = l.information;
-    information.diagonal().head(l.prior.size()) += l.prior;
-    information.diagonal().tail(n).array() += 1 / (kLargestStep_mm * kLargestStep_mm);
-    const Eigen::VectorXd step = information.ldlt().solve(l.score).tail(n);
-    bool better = false;
-    for (const double length : {1.0, 0.4, 0.16}) {
-      FitState trial = state;
-      for (std::size_t b = 0; b < slopes.size(); ++b) {
-        MovingPoint& point = curve_of(trial.model.terms[place].blocks[b]).axis.point;
-        point.x_mm += length * step[static_cast<Eigen::Index>(2 * b)];
-        point.y_mm += length * step[static_cast<Eigen::Index>(2 * b + 1)];
-      }
-      fitter.fit(trial, 2);
-      const double found = fitter.log_likelihood(trial);
-      // Negated, so that a likelihood that is no number is no progress.
-      if (!(found > likelihood + kLeastRise)) continue;
-      likelihood = found;
-      state = std::move(trial);
-      better = moved = true;
-      break;
+    return slopes;
+  };
+  steps.move = [place](FitState& trial, const Eigen::VectorXd& step_mm) {
+    Eigen::Index i = 0;
+    for (Block& block : trial.model.terms[place].blocks) {
+      MovingPoint& point = curve_of(block).axis.point;
+      point.x_mm += step_mm[i++];
+      point.y_mm += step_mm[i++];
     }
-    if (!better) break;
-  }
-  return moved;
+  };
+  steps.most = 5;
+  steps.largest_step = 40;  // mm
+  double likelihood = fitter.log_likelihood(state);
+  return move_numbers(fitter, state, steps, likelihood);
 }
 
 /// Fits until the likelihood settles: the base speeds move far when a curve becomes a step.

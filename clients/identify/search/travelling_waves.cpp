@@ -1,6 +1,6 @@
 #include "clients/identify/search/travelling_waves.hpp"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "clients/identify/search/dictionary_builder.hpp"
-#include "clients/identify/search/local_quadratic.hpp"
+#include "clients/identify/search/number_steps.hpp"
 #include "clients/identify/search/phasor_sums.hpp"
 #include "clients/identify/search/visits.hpp"
 #include "core/os/worker_pool.hpp"
@@ -212,43 +212,28 @@ bool stand_still(const Fitter& fitter, FitState& state, std::size_t place, doubl
 }  // namespace
 
 bool refine_wave_numbers(const Fitter& fitter, FitState& state, std::size_t place) {
-  constexpr int kMostPasses = 6;
-  constexpr double kSettled = 1;
   if (wave_of(state.model.terms[place]) == nullptr) return false;
   const Extent extent = extent_of(state.tracks);
   const std::array<Factor, 3> along{
       over(Factor::Shape::kLinear, Covariate::kX, extent.x_low_mm, extent.x_high_mm, 1),
       over(Factor::Shape::kLinear, Covariate::kY, extent.y_low_mm, extent.y_high_mm, 1),
       over(Factor::Shape::kLinear, Covariate::kTime, 0, extent.duration_s, 1)};
-  bool changed = false;
-  double likelihood = fitter.log_likelihood(state);
-  for (int pass = 0; pass < kMostPasses; ++pass) {
-    Term& term = state.model.terms[place];
+  NumberSteps steps;
+  steps.slopes = [&](const FitState& now) {
+    const Term& term = now.model.terms[place];
     const Block& block = term.blocks.front();
-    const Factor slope = derivative_of(*wave_of(term), block.basis, term.coefficients);
+    const Factor slope = derivative_of(block.basis.factors.front(), block.basis, term.coefficients);
     std::vector<Block> blocks;
     for (const Factor& covariate : along) blocks.push_back({block.target, Basis{{covariate, slope}}, block.during});
-    const LocalQuadratic l = local_quadratic(fitter, state, state.model.terms.size(), blocks, true);
-    Eigen::MatrixXd information = l.information;
-    information.diagonal() += l.prior;
-    const Eigen::Vector3d step = information.ldlt().solve(l.score).tail<3>();
-    bool better = false;
-    for (const double length : {1.0, 0.4, 0.16}) {
-      FitState trial = state;
-      std::vector<double>& numbers = wave_of(trial.model.terms[place])->points;
-      for (std::size_t d = 0; d < numbers.size(); ++d)
-        numbers[d] +=
-            (d == 2 ? -1 : 1) * length * step[static_cast<Eigen::Index>(d)] / (along[d].high - along[d].low);
-      const double found = fitter.fit_for_likelihood(trial, 2);
-      // Negated, so that a likelihood that is no number is no progress.
-      if (!(found > likelihood + kSettled)) continue;
-      likelihood = found;
-      state = std::move(trial);
-      better = changed = true;
-      break;
-    }
-    if (!better) break;
-  }
+    return blocks;
+  };
+  steps.move = [&](FitState& trial, const Eigen::VectorXd& step) {
+    std::vector<double>& numbers = wave_of(trial.model.terms[place])->points;
+    for (std::size_t d = 0; d < numbers.size(); ++d)
+      numbers[d] += (d == 2 ? -1 : 1) * step[static_cast<Eigen::Index>(d)] / (along[d].high - along[d].low);
+  };
+  double likelihood = fitter.log_likelihood(state);
+  const bool changed = move_numbers(fitter, state, steps, likelihood);
   return stand_still(fitter, state, place, extent.duration_s, likelihood) || changed;
 }
 
