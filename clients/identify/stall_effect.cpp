@@ -26,6 +26,8 @@ constexpr double kMostMirrored = 0.5;
 /// Random spells of different robots are independent, which gives a dispersion of 1. Robots that are slow together show an effect that the
 /// model lacks.
 constexpr double kMostDispersion = 2;
+/// A true spell may hold a robot where others come near, for as long as it lasts.
+constexpr double kMostAtObstacles = 2;
 /// Mean time apart, number, scale and tail of durations; and the speed within, if it is not zero.
 constexpr std::uint32_t kDegrees = 3;
 
@@ -130,7 +132,8 @@ std::optional<StallEffect> find_stalls(const Fitter& fitter, FitState& state) {
   out.degrees = kDegrees + (out.stalls.gain > 0 ? 1 : 0);
   out.log10_p = stats::log10_chi_squared_tail(2 * std::max(0.0, out.gain), out.degrees);
   std::tie(out.held_out, out.held_out_se) = cross_validated(scan, found, trial);
-  if (scan.dispersion(found) > kMostDispersion) return std::nullopt;
+  if (scan.dispersion(found) > kMostDispersion || scan.share_at_obstacles(found, trial.model) > kMostAtObstacles)
+    return std::nullopt;
   if (out.spells < kFewestSpells || !(out.log10_p < kStallThreshold_log10_p) || !(out.held_out > kLeastStallGain) ||
       !(out.held_out > kLeastStallErrors * out.held_out_se))
     return std::nullopt;

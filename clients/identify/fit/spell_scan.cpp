@@ -100,4 +100,27 @@ double SpellScan::dispersion(const Found& found) const {
   return expected > 0 ? squares / expected : 1;
 }
 
+double SpellScan::share_at_obstacles(const Found& found, const MotionModel& model) const {
+  // Beyond contacts as the model has them, and beyond what a robot passes in a few seconds.
+  constexpr double kNear_mm = 40;
+  struct Time {
+    double stalled = 0, all = 0;
+  };
+  Time near, far;
+  for (std::size_t v = 0; v < found.tracks.size(); ++v) {
+    const TrackView& view = views_[v];
+    for (std::size_t i = 1; i < found.tracks[v].share.size(); ++i) {
+      const Sample& sample = view.track->samples[i];
+      const bool at_obstacle = model.walls.at_wall(sample.x_mm, sample.y_mm, kNear_mm) ||
+                               (model.contacts && view.neighbours->view(view.place, sample.time_s).nearest_mm <
+                                                      model.contact_range_mm + kNear_mm);
+      Time& time = at_obstacle ? near : far;
+      time.stalled += static_cast<double>(found.tracks[v].share[i]);
+      time.all += 1;
+    }
+  }
+  if (near.all == 0 || far.all == 0 || near.stalled == 0) return 1;
+  return near.stalled / near.all / (std::max(far.stalled, 0.5) / far.all);
+}
+
 }  // namespace kilotwin::identify

@@ -31,6 +31,9 @@ class SpellScan {
   /// Mean square deviation of the number of robots in a spell from its mean, over that of independent robots with the same share of
   /// time in spells: 1 for independent robots, up to their number if all stall together. Without two robots in a run: 1.
   [[nodiscard]] double dispersion(const Found&) const;
+  /// The share of time in spells near walls and other robots, over that elsewhere: 1 for spells that occur by chance. An obstacle
+  /// that is not where the model has it looks like a stall beside it. Without robots that are both: 1.
+  [[nodiscard]] double share_at_obstacles(const Found&, const MotionModel&) const;
   [[nodiscard]] const std::vector<TrackView>& views() const { return views_; }
 
  private:
