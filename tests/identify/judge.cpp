@@ -1,8 +1,9 @@
 // Evaluates `kilotwin identify` on the scenes of tests/identify/truth. Prints prediction errors before and after
 // beside those of an oracle, correctly named effects, and false findings. Exit status 1 if a criterion fails.
 // Usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--robots N] [--runs N] [--seconds S]
-//              [--nothing N] [--coverage N] [--rivals] [--jobs N] [--all | SCENE|nothing:SEED...]
+//              [--nothing N] [--random N] [--coverage N] [--rivals] [--jobs N] [--all | SCENE|nothing:SEED|random:SEED...]
 // --all: all scenes, without sets that have no effect.
+// --random N: N sets with random effects, of the seeds 1000 S and so on.
 // --coverage N: how often the 95 % intervals of N sets hold the true values. With scenes: of N sets of each, and their bands.
 // --rivals: other methods on the same scenes, beside it.
 // --robots, --runs and --seconds override a scene's number of robots, number of training runs and their duration.
@@ -52,6 +53,7 @@ struct Arguments {
   int runs = 0;        ///< training runs; 0: the scene's
   double seconds = 0;  ///< of training runs; 0: the scene's
   int nothing = 0;
+  int random = 0;    ///< sets
   int coverage = 0;  ///< sets
   int jobs = 1;
   std::vector<std::string> scenes;
@@ -61,7 +63,8 @@ int usage() {
   fmt::print(
       stderr,
       "usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--robots N] [--runs N] [--seconds S] "
-      "[--nothing N] [--coverage N] [--rivals] [--jobs N] [--all | SCENE|nothing:SEED...]\n"
+      "[--nothing N] [--random N] [--coverage N] [--rivals] [--jobs N] [--all | "
+      "SCENE|nothing:SEED|random:SEED...]\n"
       "Without scenes and --nothing: all scenes, and 300 small sets without an effect. Scenes: {}\n",
       fmt::join(scenario_names(), " "));
   return 2;
@@ -112,11 +115,6 @@ Scene resized(Scene scene, int robots, int runs, double seconds) {
   if (runs > 0) scene.train_runs = runs;
   if (seconds > 0) scene.train_s = seconds;
   return scene;
-}
-
-/// A scene by name; "nothing:N" is the small scene without effect for seed N.
-Scene scene_of(const std::string& name) {
-  return name.rfind("nothing:", 0) == 0 ? nothing_to_find(std::stoull(name.substr(8))) : scenario(name);
 }
 
 std::string in_quotes(const fs::path& path) { return "'" + path.string() + "'"; }
@@ -187,7 +185,7 @@ Verdict try_scene(const Arguments& arguments, const Scene& scene, std::uint64_t 
 
 /// A scene by name, with the size that the arguments give it.
 Scene scene_of(const Arguments& arguments, const std::string& name) {
-  Scene scene = scene_of(name);
+  Scene scene = scenario(name);
   if (arguments.small) scene = smaller(std::move(scene));
   return resized(std::move(scene), arguments.robots, arguments.runs, arguments.seconds);
 }
@@ -280,6 +278,59 @@ int judge_nothing(const Arguments& arguments, const fs::path& folder) {
   return failed + findings;
 }
 
+/// Sets with random effects. Returns the number of sets that failed.
+int judge_random(const Arguments& arguments, const fs::path& folder) {
+  struct Sums {
+    int failed = 0, near_oracle = 0, silent = 0, named = 0, causes = 0, right = 0, found = 0;
+    std::vector<double> ratios, improvements;
+  } sums;
+  std::mutex printing;
+  print_header();
+  kilotwin::os::in_parallel(
+      static_cast<std::size_t>(arguments.random), static_cast<std::uint32_t>(arguments.jobs), [&](std::size_t i) {
+        const std::uint64_t seed = arguments.seed * 1000 + i;
+        const Scene scene = scene_of(arguments, fmt::format("random:{}", seed));
+        const Verdict v = try_scene(arguments, scene, seed, arguments.small ? 30 : 100, folder / scene.name);
+        const std::lock_guard lock(printing);
+        print_row(v);
+        fmt::print("  {}\n", scene.about);
+        std::fflush(stdout);
+        if (!v.failure.empty()) {
+          ++sums.failed;
+          return;
+        }
+        sums.ratios.push_back(v.ratio());
+        sums.improvements.push_back(v.before_mm / v.after_mm);
+        if (v.ratio() <= Verdict::kRatio)
+          ++sums.near_oracle;
+        else if (v.unexplained.empty() && !v.perhaps)
+          ++sums.silent;
+        sums.named += v.named;
+        sums.causes += v.causes;
+        sums.found += static_cast<int>(v.found.size());
+        sums.right += static_cast<int>(v.found.size() - v.false_findings.size());
+      });
+  const auto sets = static_cast<int>(sums.ratios.size());
+  if (sums.failed > 0) fmt::print("failed: {} of {} sets\n", sums.failed, arguments.random);
+  if (sets == 0) return sums.failed;
+  const double recall = static_cast<double>(sums.named) / sums.causes,
+               precision = static_cast<double>(sums.right) / std::max(sums.found, 1);
+  fmt::print("error at or below {:.2f} of the oracle's: {}\n", Verdict::kRatio,
+             share_in_words(sums.near_oracle, sets));
+  fmt::print("error above it, and nothing said: {}\n", share_in_words(sums.silent, sets));
+  const auto quantile = [](std::vector<double>& of, double share) {
+    return kilotwin::stats::nearest_quantile(of, share);
+  };
+  fmt::print("error over the oracle's: median {:.3f}, 90 % of sets below {:.3f}, largest {:.3f}\n",
+             quantile(sums.ratios, 0.5), quantile(sums.ratios, 0.9), quantile(sums.ratios, 1));
+  fmt::print("error of the base model over the identified one's: median {:.2f}\n",
+             quantile(sums.improvements, 0.5));
+  fmt::print("causes: recall {:.2f} ({} of {}), precision {:.2f} ({} of {}), F1 {:.2f}\n", recall, sums.named,
+             sums.causes, precision, sums.right, sums.found,
+             recall + precision > 0 ? 2 * recall * precision / (recall + precision) : 0);
+  return sums.failed;
+}
+
 /// Identify beside its rivals. Returns the number of scenes in which identify failed.
 int judge_rivals(const Arguments& arguments, const fs::path& folder) {
   int failed = 0;
@@ -337,7 +388,7 @@ int main(int argc, char** argv) {
       } else if (word == "--all") {
         arguments.scenes = scenario_names();
       } else if (word.rfind("--", 0) != 0) {
-        scene_of(word);
+        scenario(word);
         arguments.scenes.push_back(word);
       } else if (i + 1 == argc) {  // NOLINT(bugprone-branch-clone): before the options that take a value
         return usage();
@@ -355,6 +406,8 @@ int main(int argc, char** argv) {
         arguments.seconds = std::stod(argv[++i]);
       } else if (word == "--nothing") {
         arguments.nothing = std::stoi(argv[++i]);
+      } else if (word == "--random") {
+        arguments.random = std::stoi(argv[++i]);
       } else if (word == "--coverage") {
         arguments.coverage = std::stoi(argv[++i]);
       } else if (word == "--jobs") {
@@ -363,7 +416,7 @@ int main(int argc, char** argv) {
         return usage();
       }
     }
-    if (arguments.scenes.empty() && arguments.nothing == 0 && arguments.coverage == 0) {
+    if (arguments.scenes.empty() && arguments.nothing == 0 && arguments.random == 0 && arguments.coverage == 0) {
       arguments.scenes = scenario_names();
       arguments.nothing = arguments.rivals ? 0 : 300;
     }
@@ -375,6 +428,7 @@ int main(int argc, char** argv) {
     // With few sets the bound is below one: then no finding is allowed.
     if (arguments.nothing > 0)
       good = judge_nothing(arguments, folder.path()) <= kFalseAlarms * arguments.nothing && good;
+    if (arguments.random > 0) good = judge_random(arguments, folder.path()) == 0 && good;
     return good ? 0 : 1;
   } catch (const std::invalid_argument&) {
     return usage();

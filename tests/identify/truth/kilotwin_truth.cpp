@@ -1,6 +1,6 @@
 // Writes a set of test data for `kilotwin identify`: OUT/train and OUT/test in the contract's form, truth.json
 // with the true values, and oracle.csv with the oracle's predictions.
-// Usage: kilotwin_truth SCENE|nothing:SEED|list [--seed N] [--out DIR] [--samples N]
+// Usage: kilotwin_truth SCENE|nothing:SEED|random:SEED|list [--seed N] [--out DIR] [--samples N]
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -29,7 +29,9 @@ std::vector<Prediction> predictions(const Scene& scene, const Play& played, int 
 }
 
 int usage() {
-  fmt::print(stderr, "usage: kilotwin_truth SCENE|nothing:SEED|list [--seed N] [--out DIR] [--samples N]; scenes:");
+  fmt::print(
+      stderr,
+      "usage: kilotwin_truth SCENE|nothing:SEED|random:SEED|list [--seed N] [--out DIR] [--samples N]; scenes:");
   for (const std::string& name : scenario_names()) fmt::print(stderr, " {}", name);
   fmt::print(stderr, "\n");
   return 2;
@@ -64,9 +66,10 @@ int main(int argc, char** argv) {
       return 0;
     }
     if (name.empty()) return usage();
-    const bool nothing = name.rfind("nothing:", 0) == 0;
-    if (nothing) seed = std::stoull(name.substr(8));
-    const Scene scene = nothing ? nothing_to_find(seed) : scenario(name);
+    // Sets by seed: of that of the scene.
+    if (const std::size_t colon = name.find(':'); colon != std::string::npos)
+      seed = std::stoull(name.substr(colon + 1));
+    const Scene scene = scenario(name);
     if (directory.empty()) directory = scene.name;
     const Play played = play(scene, seed);
     write_data(scene, played.train, directory + "/train");

@@ -7,6 +7,7 @@
 #include "tests/identify/truth/effects.hpp"
 #include "tests/identify/truth/laboratories.hpp"
 #include "tests/identify/truth/laboratory_effects.hpp"
+#include "tests/identify/truth/random_effects.hpp"
 
 namespace kilotwin::truth {
 namespace {
@@ -315,6 +316,8 @@ std::vector<std::string> scenario_names() {
 }
 
 Scene scenario(const std::string& name) {
+  if (name.starts_with("nothing:")) return nothing_to_find(std::stoull(name.substr(8)));
+  if (name.starts_with("random:")) return random_effects(std::stoull(name.substr(7)));
   for (const Entry& entry : kEntries) {
     if (name != entry.name) continue;
     Scene scene = entry.make();

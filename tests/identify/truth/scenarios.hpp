@@ -11,7 +11,7 @@ namespace kilotwin::truth {
 /// At least one per covariate, look-alikes, combinations, weak effects, faults: in the order of the table.
 std::vector<std::string> scenario_names();
 
-/// Throws std::invalid_argument for an unknown name.
+/// "nothing:SEED" is nothing_to_find(SEED), "random:SEED" random_effects(SEED). Throws std::invalid_argument for an unknown name.
 Scene scenario(const std::string& name);
 
 /// A small scene without effect. Everything else, from tracker to arena, depends on `seed`.
