@@ -190,6 +190,12 @@ Scene scene_of(const Arguments& arguments, const std::string& name) {
   return resized(std::move(scene), arguments.robots, arguments.runs, arguments.seconds);
 }
 
+/// The seed of a scene's play: that of its name, as in "random:7", or that of the arguments.
+std::uint64_t seed_of(const Arguments& arguments, const std::string& name) {
+  const std::size_t colon = name.find(':');
+  return colon == std::string::npos ? arguments.seed : std::stoull(name.substr(colon + 1));
+}
+
 void print_header() {
   fmt::print("{:20} {:>8} {:>8} {:>8} {:>6} | {:>8} {:>8} {:>8} {:>6} | {:>6} {:>5} {:>5} {:>5} {:>7}  {}\n",
              "scene", "before", "after", "oracle", "ratio", "from20s", "after", "oracle", "ratio", "named", "false",
@@ -222,9 +228,10 @@ int judge_scenes(const Arguments& arguments, const fs::path& folder) {
   print_header();
   kilotwin::os::in_parallel(
       arguments.scenes.size(), static_cast<std::uint32_t>(arguments.jobs), [&](std::size_t i) {
-        const Scene scene = scene_of(arguments, arguments.scenes[i]);
+        const std::string& name = arguments.scenes[i];
+        const Scene scene = scene_of(arguments, name);
         const Verdict verdict =
-            try_scene(arguments, scene, arguments.seed, arguments.small ? 30 : 100, folder / scene.name);
+            try_scene(arguments, scene, seed_of(arguments, name), arguments.small ? 30 : 100, folder / scene.name);
         const std::lock_guard lock(printing);
         print_row(verdict);
         if (!verdict.good()) ++misses;

@@ -49,6 +49,10 @@ constexpr double kRemnant = 0.003;
 constexpr std::size_t kEnoughSamples = 130000;
 /// The same for general terms, which have more columns.
 constexpr std::size_t kEnoughForGeneral = 70000;
+/// The same where the error that is left looks like noise: enough for a clear effect. Such an effect must pass by these margins beyond
+/// the thresholds, because the error itself gives no reason to look for one.
+constexpr std::size_t kEnoughForScreening = 25000;
+constexpr double kClearEvidence = 15, kClearLog10P = 2, kClearHeldOut = 8;
 /// General terms that are tried in one round.
 constexpr std::size_t kMostTries = 4;
 /// An attempt of the search. One that failed is not repeated.
@@ -240,6 +244,9 @@ class Loop {
   static bool good(const Finding& f, double threshold) {
     return f.log10_p < threshold && f.evidence > 3 && f.held_out > 2;
   }
+  static bool clear(const Finding& f, double threshold) {
+    return f.log10_p < threshold - kClearLog10P && f.evidence > kClearEvidence && f.held_out > kClearHeldOut;
+  }
   const Hypothesis& hypothesis(const Finding& f) const { return dictionary_.hypotheses[f.hypothesis]; }
 
   /// Gain in log likelihood of all accepted effects.
@@ -251,20 +258,24 @@ class Loop {
     Reason reason;
   };
   using Candidates = std::map<Attempt, GeneralTerm>;
-  /// Adds the hypotheses of a family that pass the tests, of each name the one with the most evidence, by kind and name.
-  void add_candidates(const Dictionary& family, bool general, double least_evidence, Candidates& best) {
+  /// Adds the hypotheses of a family that pass the tests, of each name the one with the most evidence, by kind and name. `screening`:
+  /// only clear ones.
+  void add_candidates(const Dictionary& family, bool general, double least_evidence, Candidates& best,
+                      bool screening = false) {
     std::vector<Block> blocks = blocks_of(out_.fit.model);
     blocks.insert(blocks.end(), family.blocks.begin(), family.blocks.end());
     const ColumnGroups read = columns_read_by_test(out_.fit.model, family);
     const std::vector<Unit> units =
-        linearise(out_.fit.model, tested_units(kEnoughForGeneral), blocks, {100, fitter_.threads(), -1, &read});
+        linearise(out_.fit.model, tested_units(screening ? kEnoughForScreening : kEnoughForGeneral), blocks,
+                  {100, fitter_.threads(), -1, &read});
     const ScoreTest test(fitter_, out_.fit.model, units, family);
     const ScoreTest::Outcome outcome = test.test(kSeed + 100 + static_cast<std::uint64_t>(round_));
     for (const Finding& f : outcome.findings) {
       const Hypothesis& h = family.hypotheses[f.hypothesis];
       const Attempt attempt{general ? Attempt::Kind::kGeneral : Attempt::Kind::kForm, {h.name}};
       const auto known = best.find(attempt);
-      if (!good(f, outcome.threshold_log10_p) || f.evidence < least_evidence || failed_.contains(attempt) ||
+      if (!(screening ? clear(f, outcome.threshold_log10_p) : good(f, outcome.threshold_log10_p)) ||
+          f.evidence < least_evidence || failed_.contains(attempt) ||
           (known != best.end() && f.evidence <= known->second.reason.finding.evidence))
         continue;
       GeneralTerm one{family.term_of(h, f.relative_scale), {h.covariates, h.acts_on, f, outcome.threshold_log10_p}};
@@ -272,20 +283,22 @@ class Loop {
       best.insert_or_assign(attempt, std::move(one));
     }
   }
-  /// Those of all families, in the order of their evidence.
-  std::vector<GeneralTerm> general_candidates() {
+  /// Those of all families, in the order of their evidence. `screening`: only clear ones.
+  std::vector<GeneralTerm> general_candidates(bool screening) {
     if (general_.empty()) general_ = general_dictionaries_of(extent_);
     std::vector<Dictionary> families = general_;
-    if (Dictionary waves = wave_dictionary_of(fitter_, out_.fit, extent_); !waves.hypotheses.empty())
-      families.push_back(std::move(waves));
-    const std::vector<MovingCircle> circles = moving_circles_of(fitter_, out_.fit, extent_);
-    if (!circles.empty()) families.push_back(dictionary_of_circles(out_.fit, extent_, circles));
+    if (!screening) {
+      if (Dictionary waves = wave_dictionary_of(fitter_, out_.fit, extent_); !waves.hypotheses.empty())
+        families.push_back(std::move(waves));
+      const std::vector<MovingCircle> circles = moving_circles_of(fitter_, out_.fit, extent_);
+      if (!circles.empty()) families.push_back(dictionary_of_circles(out_.fit, extent_, circles));
+    }
     Candidates best;
     const double least = kRemnant * explained();
     for (const Dictionary& family : families) {
       // Waves and moving circles have a form of their own, with a name.
       const bool general = static_cast<std::size_t>(&family - families.data()) < general_.size();
-      add_candidates(family, general, least, best);
+      add_candidates(family, general, least, best, screening);
     }
     std::vector<GeneralTerm> ranked;
     for (auto& [attempt, one] : best) ranked.push_back(std::move(one));
@@ -400,12 +413,12 @@ class Loop {
     add_candidates(dictionary_of_circles(out_.fit, extent_, circles), false, kRemnant * explained(), best);
     return !best.empty() && fits(std::move(best.begin()->second), attempt);
   }
-  /// Adds the general term with the most evidence that fits, if much is left unexplained. Returns whether there is one.
+  /// Adds the general term with the most evidence that fits. If little is left unexplained by its own expectation, only a clear one: an
+  /// effect that looks like noise raises what the model expects of itself. Returns whether there is one.
   bool accept_general() {
     if (general_terms_ == kMostGeneral || !limit().empty() || !leaves_much_) return false;
     say(kGeneralTerms, "testing general terms");
-    if (!leaves_much_(out_.fit)) return false;
-    for (GeneralTerm& one : general_candidates()) {
+    for (GeneralTerm& one : general_candidates(!leaves_much_(out_.fit))) {
       if (worked_out()) break;
       const Attempt attempt{one.term.general ? Attempt::Kind::kGeneral : Attempt::Kind::kForm, {one.term.name}};
       if (!fits(std::move(one), attempt)) continue;

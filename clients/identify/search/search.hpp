@@ -66,7 +66,7 @@ struct Search {
 inline constexpr int kMostRounds = 7;
 
 /// Starts from a fitted base model. `leaves_much`: whether a model leaves a
-/// large systematic error of the data of the fit; only then general terms are tested, those without a named form.
+/// large systematic error of the data of the fit; else only clear general terms are accepted, those without a named form.
 [[nodiscard]] Search search(const Fitter&, const FitState& base, const WorkLog&,
                             const std::function<bool(const FitState&)>& leaves_much = {});
 
