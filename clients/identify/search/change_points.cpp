@@ -224,20 +224,20 @@ bool put_steps(const Fitter& fitter, FitState& state, std::size_t place, const S
   return true;
 }
 
-/// Run time, or a motor-on time.
-bool goes_on(const Axis& axis) {
+}  // namespace
+
+bool only_rises(const Axis& axis) {
   switch (axis.of) {
     case Covariate::kTime:
     case Covariate::kMotorTime:
     case Covariate::kLeftMotorTime:
     case Covariate::kRightMotorTime:
     case Covariate::kMotorTimeSum:
-    case Covariate::kDrivenTime: return axis.decay_index == 0;
+    case Covariate::kDrivenTime:
+    case Covariate::kCommandCount: return axis.decay_index == 0;
     default: return false;
   }
 }
-
-}  // namespace
 
 std::string find_change_points(const Fitter& fitter, FitState& state, std::size_t place) {
   const MotionModel& model = state.model;
@@ -252,7 +252,7 @@ std::string find_change_points(const Fitter& fitter, FitState& state, std::size_
     if (block.target == Target::kMeasuredTurn || block.target == Target::kMeasuredScale) return name;
     const Factor& f = *curve;
     product = product || block.basis.factors.size() > 1;
-    if (!goes_on(f.axis) || f.shape != Shape::kCosines) return name;
+    if (!only_rises(f.axis) || f.shape != Shape::kCosines) return name;
     duration_s = std::max(duration_s, f.high);
     if (std::none_of(kinds.begin(), kinds.end(),
                      [&](const Block& b) { return b.target == block.target && b.during == block.during; }))

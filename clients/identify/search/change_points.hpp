@@ -7,7 +7,10 @@
 
 namespace kilotwin::identify {
 
-/// Replaces a curve over run time or motor-on time by steps at fitted change points, or adds steps to it, if the
+/// Whether a covariate only rises in a run: run time, a motor-on time, the number of commands.
+[[nodiscard]] bool only_rises(const Axis&);
+
+/// Replaces a curve over such a covariate by steps at fitted change points, or adds steps to it, if the
 /// evidence rises. A drift in the world may turn out to be a shift of the camera, or the reverse. Returns the name
 /// of the resulting term. A curve that known factors multiply becomes steps only; its constant is a step before all data.
 std::string find_change_points(const Fitter&, FitState&, std::size_t term);

@@ -332,9 +332,9 @@ double ProductFit::cost() const {
   return sum;
 }
 
-/// A function of time that steps explain better becomes steps. It is open.
+/// A function of what only rises in a run that steps explain better becomes steps. It is open.
 void ProductFit::became_steps(std::size_t open) {
-  if (functions_[open].axis.of != Covariate::kTime || functions_[open].shape != Shape::kCosines) return;
+  if (!only_rises(functions_[open].axis) || functions_[open].shape != Shape::kCosines) return;
   (void)find_change_points(fitter_, state_, place_);
   const Factor* const found = term().blocks.front().basis.only_open();
   if (found == nullptr || found->shape != Shape::kAtLeast || found->points.back() < 0) return;
@@ -500,13 +500,15 @@ struct Pair {
   std::vector<std::pair<Eigen::Index, Eigen::Index>> at;  ///< row and column of each coefficient
 };
 
-/// A term with two open factors per block; blocks continue the cosines of the first factor. Nothing: another term.
+/// The blocks of a term that act on one target: two open factors each, of which the first continues the cosines of the block before.
+/// Nothing: another term.
 std::optional<Pair> pair_of(const Term& term) {
   Pair pair;
   Eigen::Index rows = 0;
   for (const Block& block : term.blocks) {
     const std::vector<Factor>& f = block.basis.factors;
-    if (f.size() != 2 || !f[0].known.empty() || !f[1].known.empty() || block.target != term.blocks.front().target)
+    if (f.size() != 2 || !f[0].known.empty() || !f[1].known.empty() || block.target != term.blocks.front().target ||
+        block.during != term.blocks.front().during)
       return std::nullopt;
     if (rows == 0) {
       pair.one = f[0];
@@ -583,25 +585,88 @@ Factor with_known(Factor f, const Eigen::VectorXd& coefficients, Target target) 
 
 }  // namespace
 
+namespace {
+
+/// The blocks of a term on one target, and their columns among those of the term.
+struct OneTarget {
+  Term term;
+  std::vector<Eigen::Index> columns;
+};
+std::vector<OneTarget> by_target(const Term& term) {
+  std::vector<OneTarget> all;
+  Eigen::Index next = 0;
+  for (const Block& block : term.blocks) {
+    auto own = std::find_if(all.begin(), all.end(), [&](const OneTarget& one) {
+      return one.term.blocks.front().target == block.target && one.term.blocks.front().during == block.during;
+    });
+    if (own == all.end()) {
+      all.push_back({{term.name, {}, {}, {}}, {}});
+      own = all.end() - 1;
+    }
+    own->term.blocks.push_back(block);
+    for (std::size_t i = 0; i < block.basis.size(); ++i) own->columns.push_back(next++);
+  }
+  for (OneTarget& one : all) {
+    one.term.coefficients = term.coefficients(one.columns);
+    one.term.precision = term.precision(one.columns);
+  }
+  return all;
+}
+
+/// The product acts on a further target, too, with an amplitude of its own: a drift has a direction.
+void add_target(Term& product, const std::vector<Factor>& functions, const Block& like) {
+  constexpr double kPrecision = 0.01;
+  product.blocks.push_back({like.target, Basis{functions}, like.during});
+  const Eigen::Index had = product.coefficients.size();
+  product.coefficients.conservativeResize(had + 1);
+  product.precision.conservativeResize(had + 1);
+  product.coefficients[had] = 0;
+  product.precision[had] = kPrecision;
+}
+
+}  // namespace
+
 bool separate(const Fitter& fitter, FitState& state, std::size_t place) {
   constexpr double kLeastShare = 0.5;
   const Term& term = state.model.terms[place];
-  const std::optional<Pair> pair = pair_of(term);
-  if (!pair || is_measured(term.blocks.front().target)) return false;
+  const std::vector<OneTarget> targets = by_target(term);
+  if (std::any_of(targets.begin(), targets.end(), [](const OneTarget& one) {
+        return !pair_of(one.term) || is_measured(one.term.blocks.front().target);
+      }))
+    return false;
   const LocalQuadratic l = local_quadratic(fitter, state, place, {});
-  const ReducedColumns data = reduced_columns(l, l.score_without(term.coefficients), l.term_columns());
-  const Eigen::VectorXd& c = term.coefficients;
-  const double whole = data.score.dot(c) - 0.5 * c.dot(data.information * c);
-  const RankOne one = rank_one(*pair, data, term);
-  if (!(one.gain > kLeastShare * whole)) return false;
+  const ReducedColumns all = reduced_columns(l, l.score_without(term.coefficients), l.term_columns());
+  // Of a target's columns, with those of the others at their values.
+  const auto data_of = [&](const OneTarget& one) {
+    Eigen::VectorXd others = term.coefficients;
+    others(one.columns).setZero();
+    return ReducedColumns{all.information(one.columns, one.columns),
+                          (all.score - all.information * others)(one.columns)};
+  };
+  const auto gain_of = [&](const OneTarget& one) {
+    const ReducedColumns data = data_of(one);
+    const Eigen::VectorXd& c = one.term.coefficients;
+    return data.score.dot(c) - 0.5 * c.dot(data.information * c);
+  };
+  const OneTarget& main =
+      *std::max_element(targets.begin(), targets.end(),
+                        [&](const OneTarget& a, const OneTarget& b) { return gain_of(a) < gain_of(b); });
+  const Pair pair = *pair_of(main.term);
+  const RankOne one = rank_one(pair, data_of(main), main.term);
+  if (!(one.gain > kLeastShare * gain_of(main))) return false;
   const Eigen::VectorXd sd = term.precision.cwiseInverse().cwiseSqrt();
-  const double cost = -log_evidence(data.information, Eigen::VectorXd::Zero(sd.size()), sd),
+  const double cost = -log_evidence(all.information, Eigen::VectorXd::Zero(sd.size()), sd),
                value = fitter.log_likelihood(state) - cost;
   FitState trial = state;
-  const Target target = term.blocks.front().target;
+  trial.model.terms[place] = main.term;
+  const Target target = main.term.blocks.front().target;
   ProductFit product(fitter, trial, place,
-                     {with_known(pair->one, one.one, target), with_known(pair->other, one.other, target)});
+                     {with_known(pair.one, one.one, target), with_known(pair.other, one.other, target)});
   product.fit();
+  const std::vector<Factor> functions = functions_of(trial.model.terms[place]);
+  for (const OneTarget& other : targets)
+    if (&other != &main) add_target(trial.model.terms[place], functions, other.term.blocks.front());
+  if (targets.size() > 1) fitter.fit(trial, 2);
   // Negated, so that a likelihood that is no number does not count.
   if (!(fitter.log_likelihood(trial) - product.cost() > value)) return false;
   state = std::move(trial);

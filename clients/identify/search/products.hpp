@@ -19,7 +19,7 @@ class ProductFit {
   /// Puts the product of `functions`, each with known coefficients, in place of a term.
   ProductFit(const Fitter&, FitState&, std::size_t term, std::vector<Factor> functions);
 
-  /// Fits all functions in turn until they converge. Each gets a rich shape; those of time may become steps, and maps with edges
+  /// Fits all functions in turn until they converge. Each gets a rich shape; those of what only rises in a run may become steps, and maps with edges
   /// grids of values. The function with the richest shape stays open.
   void fit();
   /// Complexity of the product: half the log determinants of the posterior precisions of its functions relative to their priors.
@@ -48,8 +48,8 @@ class ProductFit {
   bool place_form_chosen_ = false;
 };
 
-/// Replaces a general term over two covariates by the product of two functions if the log likelihood less the complexity rises.
-/// Returns whether it did.
+/// Replaces a term over two covariates by the product of two functions if the log likelihood less the complexity rises. A term of
+/// several targets, as a drift, gets an amplitude per target. Returns whether it did.
 bool separate(const Fitter&, FitState&, std::size_t term);
 
 /// Fits the tables of all products anew, with a value for each robot of the tracks: of a model that was fitted to a part of them. A

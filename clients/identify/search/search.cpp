@@ -546,6 +546,11 @@ class Loop {
       refine_curves(fitter_, out_.fit, place);
     // Smooth curves leave residuals of a switch, which would pass the tests as one further term after another.
     if (became_switch(place)) return;
+    // So does a sum of products of what is one product.
+    if (separate(fitter_, out_.fit, place)) {
+      extend_targets(fitter_, out_.fit, place);
+      return;
+    }
     const std::string before = out_.fit.model.terms[place].name;
     if (refine_wave_numbers(fitter_, out_.fit, place)) refit(fitter_, out_.fit, place);
     if (refine_moving_circle(fitter_, out_.fit, place)) {
