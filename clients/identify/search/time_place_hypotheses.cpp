@@ -5,6 +5,17 @@ namespace {
 
 using Shape = Factor::Shape;
 
+/// Columns of a compass that varies, and its mean: a constant error looks like a slip of all robots.
+void add_compass(DictionaryBuilder& make, const char* of, const std::vector<Eigen::Index>& bases,
+                 const std::vector<Eigen::Index>& sizes) {
+  const auto constant = make.put(kCompass, Basis{});
+  for (const Eigen::Index size : sizes) {
+    std::vector<Eigen::Index> columns = some(bases, 0, size);
+    columns.insert(columns.end(), constant.begin(), constant.end());
+    make.add(kCompass, of, {of}, columns);
+  }
+}
+
 }  // namespace
 
 std::vector<Eigen::Index> add_time_hypotheses(DictionaryBuilder& make, const Extent& extent) {
@@ -24,7 +35,8 @@ std::vector<Eigen::Index> add_time_hypotheses(DictionaryBuilder& make, const Ext
     for (const Eigen::Index c : some(aside, 0, n)) all.push_back(c);
     make.add(kCamera, "time", {"time"}, all);
   }
-  if (extent.headings) make.curve(kCompass, "time", {"time"}, smooth(6), {1, 3, 6}, false);
+  if (extent.headings)
+    add_compass(make, "time", make.curve(kCompass, "time", {"time"}, smooth(6), {1, 3, 6}, false), {1, 3, 6});
   // Steps, and pulses between two steps.
   constexpr int kSteps = 40;
   std::vector<double> at;
@@ -69,7 +81,7 @@ std::vector<Eigen::Index> add_place_hypotheses(DictionaryBuilder& make, const Ex
   const auto lens = make.put(kCamera, Basis{{bent}});
   for (Eigen::Index o = 1; o <= 5; ++o)
     make.add(kCamera, "position", {"position"}, some(lens, 0, (o + 1) * (o + 2) / 2 - 1));
-  if (extent.headings) map(kCompass, 4);
+  if (extent.headings) add_compass(make, "position", map(kCompass, 4), {2, 5, 9, 14});
   // Stripes finer than the maps resolve: mosaic seams, floor boards.
   const auto stripes = [&](const TargetGroup& group, Covariate of, double low, double high, std::uint32_t count) {
     const auto bases = make.put(group, Basis{{over(Shape::kCosines, of, low, high, count)}});
@@ -88,7 +100,8 @@ void add_heading_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   make.curve(kSpeed, "heading", {"heading"}, round, {2, 4, 8}, false);
   make.curve(kTurning, "heading", {"heading"}, round, {2, 4, 8}, false);
   make.curve(kSlip, "heading", {"heading"}, round, {2, 4}, false);
-  if (extent.headings) make.curve(kCompass, "heading", {"heading"}, round, {2, 4}, false);
+  if (extent.headings)
+    add_compass(make, "heading", make.curve(kCompass, "heading", {"heading"}, round, {2, 4}, false), {2, 4});
 }
 
 void add_drift_hypotheses(DictionaryBuilder& make, const Extent& extent, const std::vector<Eigen::Index>& in_time,
