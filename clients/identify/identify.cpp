@@ -23,6 +23,8 @@ namespace {
 
 /// Joint Monte Carlo rollouts of the predictions that are reported.
 constexpr std::uint32_t kRollouts = 64;
+/// The same of the last check, which compares models by equal draws: enough for robots that may or may not touch.
+constexpr std::uint32_t kRolloutsToChoose = 16;
 constexpr std::uint32_t kDrawsSeed = 1;
 
 /// Windows of the tracks of the fit.
@@ -177,7 +179,9 @@ void choose(Findings& f, const Fitter& fitter, const MeasuredSet& train, const M
   ForecastTimes fast = reported;
   fast.rollouts = 0;
   if (evaluation.of() != Tracks::kHeldOut && choosing.judge(f.base, fast).errors.rows > 0) {
-    choose_on_held_out(f, fitter, choosing, reported);
+    ForecastTimes times = reported;
+    times.rollouts = kRolloutsToChoose;
+    choose_on_held_out(f, fitter, choosing, times);
   } else if (evaluation.held_out() != HeldOut::kTestSet && evaluation.judge(f.base, fast).errors.rows > 0) {
     f.check.chose_on_reported = true;
     choose_on_held_out(f, fitter, evaluation, reported);
