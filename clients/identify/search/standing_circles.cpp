@@ -28,6 +28,9 @@ constexpr double kLoss = 10, kLossShare = 0.05;
 /// The share of the map's gain that n circles have to reach over n, or no further one is tried; and that of their curves, or no edges
 /// are tried.
 constexpr double kLeastOfEach = 0.25, kLeastCurves = 0.15;
+/// Work that circles may cost: a share of that of the search, between these bounds. Beyond, the map stays unless circles so far are
+/// better. Two patches cost 1.3 times their search in a small set, of which most is soon over.
+constexpr double kShareOfWork = 0.8, kLeastWork = 5e7, kMostOfWork = 1.5e8;
 /// Prior standard deviation of the coefficients before their first fit: of gains, or of rad/s.
 constexpr double kPriorSd = 0.3;
 /// Log of the number of choices for one number of a circle.
@@ -254,8 +257,9 @@ void add_curve(const Fitter& fitter, FitState& state, std::size_t place, Target 
 }
 
 /// Moves numbers of the circles by steps as long as the likelihood rises. `first_mm`: the first step, which is halved down to 0.7 mm.
+/// Ends early at `most_work`.
 void climb(const Fitter& fitter, FitState& state, std::size_t place, double first_mm,
-           const std::vector<double& (*)(Factor&)>& numbers) {
+           const std::vector<double& (*)(Factor&)>& numbers, std::uint64_t most_work) {
   constexpr double kLast_mm = 0.7;
   double likelihood = fitter.log_likelihood(state);
   const auto moved = [&](std::size_t b, double& (*number)(Factor&), double by_mm) {
@@ -273,11 +277,12 @@ void climb(const Fitter& fitter, FitState& state, std::size_t place, double firs
   for (double step_mm = first_mm; step_mm > kLast_mm; step_mm /= 2)
     for (std::size_t b = 0; b < circles; ++b)
       for (const auto number : numbers)
-        if (!moved(b, number, step_mm)) moved(b, number, -step_mm);
+        if (state.tracks.work() < most_work && !moved(b, number, step_mm)) moved(b, number, -step_mm);
 }
 
 /// The term with one step per circle in place of its curves. The radii begin at these.
-FitState with_edges(const Fitter& fitter, FitState state, std::size_t place, const std::vector<double>& radii_mm) {
+FitState with_edges(const Fitter& fitter, FitState state, std::size_t place, const std::vector<double>& radii_mm,
+                    std::uint64_t most_work) {
   Term& term = state.model.terms[place];
   const auto circles = static_cast<Eigen::Index>(term.blocks.size());
   for (Eigen::Index b = 0; b < circles; ++b) {
@@ -294,8 +299,8 @@ FitState with_edges(const Fitter& fitter, FitState state, std::size_t place, con
   const auto radius = [](Factor& edge) -> double& { return edge.points.front(); };
   const auto x = [](Factor& edge) -> double& { return edge.axis.point.x_mm; };
   const auto y = [](Factor& edge) -> double& { return edge.axis.point.y_mm; };
-  climb(fitter, state, place, 12, {radius});
-  climb(fitter, state, place, 2, {x, y, radius});
+  climb(fitter, state, place, 12, {radius}, most_work);
+  climb(fitter, state, place, 2, {x, y, radius}, most_work);
   refit(fitter, state, place);
   return state;
 }
@@ -310,7 +315,7 @@ bool lies_within(const Term& term, const Extent& e) {
 }
 
 /// Returns whether circles replaced the map.
-bool replace_by_circles(const Fitter& fitter, FitState& state, std::size_t place) {
+bool replace_by_circles(const Fitter& fitter, FitState& state, std::size_t place, std::uint64_t most_work) {
   const std::optional<Target> target = target_of_map(state.model.terms[place]);
   if (!target) return false;
   const Extent extent = extent_of(state.tracks);
@@ -326,7 +331,7 @@ bool replace_by_circles(const Fitter& fitter, FitState& state, std::size_t place
                least = had - kLoss - kLossShare * (had - without);
   std::optional<FitState> best;
   double most = -INFINITY, reached = -INFINITY;
-  for (std::size_t n = 1; n <= kMostCircles; ++n) {
+  for (std::size_t n = 1; n <= kMostCircles && state.tracks.work() < most_work; ++n) {
     const std::optional<Disc> disc =
         next_disc(map, n == 1 ? nullptr : &circles.model.terms[place], *target, extent, all);
     if (!disc) break;
@@ -348,7 +353,7 @@ bool replace_by_circles(const Fitter& fitter, FitState& state, std::size_t place
     // Curves reach most of what edges reach.
     if (!(reached - without > kLeastCurves * static_cast<double>(n) * (had - without))) break;
     const std::vector<double> radii_mm = radii_of(map, circles.model.terms[place], *target, extent);
-    better(with_edges(fitter, circles, place, radii_mm));
+    better(with_edges(fitter, circles, place, radii_mm, most_work));
     // So few circles will not do.
     if (!(reached - without > kLeastOfEach * static_cast<double>(n) * (had - without))) break;
   }
@@ -361,9 +366,12 @@ bool replace_by_circles(const Fitter& fitter, FitState& state, std::size_t place
 
 void replace_maps_by_circles(const Fitter& fitter, Search& found) {
   Stage before{found.fit, found.reasons};
+  const auto searched = static_cast<double>(found.fit.tracks.work());
+  const auto most_work =
+      static_cast<std::uint64_t>(searched + std::clamp(kShareOfWork * searched, kLeastWork, kMostOfWork));
   bool replaced = false;
   for (std::size_t t = 0; t < found.fit.model.terms.size(); ++t)
-    replaced = replace_by_circles(fitter, found.fit, t) || replaced;
+    replaced = replace_by_circles(fitter, found.fit, t, most_work) || replaced;
   if (replaced) found.with_maps = std::move(before);
 }
 
