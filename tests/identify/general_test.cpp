@@ -1,20 +1,24 @@
-// Parts of the search on small scenes: lag of the commands, travelling waves, switches, uncertainty, traffic that fades, walls.
+// Parts of the search on small scenes: lag of the commands, products, travelling waves, switches, uncertainty, traffic that fades, walls.
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "clients/identify/fit/persistent_residuals.hpp"
 #include "clients/identify/fit/uncertainty.hpp"
 #include "clients/identify/fit/wall_detection.hpp"
 #include "clients/identify/model/effect_records.hpp"
+#include "clients/identify/search/products.hpp"
 #include "clients/identify/search/search.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
 #include "clients/identify/search/simplification.hpp"
 #include "clients/identify/search/travelling_waves.hpp"
 #include "tests/identify/small_set.hpp"
 #include "tests/identify/truth/effects.hpp"
+#include "tests/identify/truth/laboratory_effects.hpp"
 
 namespace kilotwin {
 namespace {
@@ -53,6 +57,92 @@ TEST(CommandLag, IsNotUsedWithoutOne) {
   fitter.fit_base(base);
   EXPECT_EQ(fitter.fit_command_lag(base), 0);
   EXPECT_EQ(base.model.base.command_lag_s, 0);
+}
+
+TEST(CommandLag, GoesWithATermThatExplainsIt) {
+  const truth::Scene scene = small({truth::inertia()});
+  const MeasuredSet set = set_of(scene, played(scene));
+  FitState base(set);
+  const Fitter fitter(set, 2);
+  fitter.fit_base(base);
+  // What looks like one at first.
+  FitState late = base;
+  ASSERT_GT(fitter.fit_command_lag(late), 0);
+  EXPECT_GT(late.model.base.command_lag_s, 0.3);
+  const identify::Search found = identify::search(fitter, base, identify::WorkLog({}));
+  EXPECT_NEAR(found.fit.model.base.command_lag_s, 0, 0.02);
+  ASSERT_FALSE(found.fit.model.terms.empty());
+  EXPECT_EQ(found.fit.model.terms.front().name, "inertia-by-command");
+}
+
+/// The first hypothesis of a name, fitted to a set and then separated; nothing if it is no product.
+std::optional<identify::Term> product_of(const MeasuredSet& set, const std::string& name) {
+  FitState state(set);
+  const Fitter fitter(set, 2);
+  fitter.fit_base(state);
+  std::vector<identify::Dictionary> all = identify::general_dictionaries_of(identify::extent_of(state.tracks));
+  all.push_back(identify::dictionary_of(identify::extent_of(state.tracks)));
+  for (const identify::Dictionary& dictionary : all) {
+    const auto at = std::find_if(dictionary.hypotheses.begin(), dictionary.hypotheses.end(),
+                                 [&](const identify::Hypothesis& h) { return h.name == name; });
+    if (at == dictionary.hypotheses.end()) continue;
+    state.model.terms.push_back(dictionary.term_of(*at, 1));
+    fitter.fit(state, 2);
+    if (!identify::separate(fitter, state, 0)) return std::nullopt;
+    return state.model.terms.front();
+  }
+  ADD_FAILURE() << "no hypothesis " << name;
+  return std::nullopt;
+}
+
+TEST(Products, OfCommandsGetTheirStep) {
+  // Turns are slow from the 21st command on.
+  const truth::Scene scene = small({truth::many_commands()});
+  const std::optional<identify::Term> term =
+      product_of(set_of(scene, played(scene)), "speed-by-command-and-command-count");
+  ASSERT_TRUE(term);
+  const std::vector<identify::Factor> functions = identify::functions_of(*term);
+  const auto step = std::find_if(functions.begin(), functions.end(), [](const identify::Factor& f) {
+    return f.axis.of == identify::Covariate::kCommandCount;
+  });
+  ASSERT_NE(step, functions.end());
+  EXPECT_EQ(step->shape, identify::Factor::Shape::kAtLeast);
+  // A number between the 20th and the 21st command, or the latter.
+  EXPECT_TRUE(std::any_of(step->points.begin(), step->points.end(), [](double p) { return p > 20 && p <= 21; }));
+}
+
+TEST(Products, OfDriftsHaveADirection) {
+  // Towards 30 degrees, on one half of the floor, ever stronger.
+  truth::Effect slope;
+  slope.name = "slope";
+  slope.push = [](const truth::Situation& at, truth::Push& push) {
+    if (!at.driven()) return;
+    const double drift_mm_s = 5 * at.time_s / 120 / (1 + std::exp(-at.disc.x / 60));
+    push.drift_mm_s.x += drift_mm_s * std::cos(M_PI / 6);
+    push.drift_mm_s.y += drift_mm_s * std::sin(M_PI / 6);
+  };
+  const truth::Scene scene = small({slope});
+  const std::optional<identify::Term> term = product_of(set_of(scene, played(scene)), "drift-by-position-and-time");
+  ASSERT_TRUE(term);
+  const auto drift_at = [&](double x_mm, double time_s) {
+    identify::Situation s;
+    s.x_mm = x_mm;
+    s.time_s = time_s;
+    Eigen::Vector2d sum(0, 0);
+    Eigen::Index next = 0;
+    for (const identify::Block& block : term->blocks) {
+      std::array<double, identify::kMostColumns> values;
+      block.basis.evaluate(s, 0, values.data());
+      for (std::size_t i = 0; i < block.basis.size(); ++i)
+        sum[block.target == identify::Target::kWorldX ? 0 : 1] += term->coefficients[next++] * values[i];
+    }
+    return sum;
+  };
+  const Eigen::Vector2d far = drift_at(200, 110), near = drift_at(-200, 110), early = drift_at(200, 10);
+  EXPECT_NEAR(std::atan2(far.y(), far.x()), M_PI / 6, 0.15);
+  EXPECT_NEAR(far.norm(), 5 * 110 / 120.0 * 0.965, 0.8);
+  EXPECT_LT(near.norm(), 1);
+  EXPECT_LT(early.norm(), 1);
 }
 
 TEST(TravellingWaves, AreFoundByTheirPeriodogram) {

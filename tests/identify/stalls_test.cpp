@@ -5,6 +5,7 @@
 #include <random>
 
 #include "clients/identify/fit/fitter.hpp"
+#include "clients/identify/fit/spell_scan.hpp"
 #include "clients/identify/model/model_file.hpp"
 #include "clients/identify/stall_effect.hpp"
 #include "tests/identify/small_set.hpp"
@@ -127,6 +128,29 @@ TEST(Stalls, AreNotFoundInNoise) {
   truth::Scene crowded = small({});
   crowded.width_mm = crowded.height_mm = 400;
   EXPECT_FALSE(WithStalls(crowded).found) << "robots that block each other";
+}
+
+TEST(Stalls, AreNoMatterOfObstacles) {
+  const truth::Scene scene = small({});
+  const MeasuredSet set = set_of(scene, played(scene));
+  FitState state(set);
+  const Fitter fitter(set, 2);
+  fitter.fit_base(state);
+  const SpellScan scan(state, 2);
+  // Shares in spells: of every third interval, or of those close to another robot.
+  const auto found = [&](bool close) {
+    SpellScan::Found out;
+    for (const TrackView& view : scan.views()) {
+      TrackSpells& track = out.tracks.emplace_back();
+      for (std::size_t i = 0; i < view.track->samples.size(); ++i) {
+        const double nearest_mm = view.neighbours->view(view.place, view.track->samples[i].time_s).nearest_mm;
+        track.share.push_back((close ? nearest_mm < 60 : i % 3 == 0) ? 1.F : 0.F);
+      }
+    }
+    return out;
+  };
+  EXPECT_NEAR(scan.share_at_obstacles(found(false), state.model), 1, 0.15);
+  EXPECT_GT(scan.share_at_obstacles(found(true), state.model), 5);
 }
 
 }  // namespace

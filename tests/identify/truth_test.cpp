@@ -133,4 +133,44 @@ TEST(Truth, EveryCovariateOfTheContractHasAScene) {
 }
 
 }  // namespace
+TEST(RandomEffects, FollowTheirSeed) {
+  std::set<std::string> kinds;
+  int pairs = 0;
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    const Scene scene = scenario("random:" + std::to_string(seed)),
+                again = scenario("random:" + std::to_string(seed));
+    EXPECT_EQ(scene.about, again.about);
+    ASSERT_FALSE(scene.effects.empty());
+    pairs += scene.effects.size() > 1 ? 1 : 0;
+    Situation at;
+    const std::vector<Vec> discs(static_cast<std::size_t>(scene.robots), Vec{40, 30});
+    at.discs = &discs;
+    at.motion = Motion::kStraight;
+    at.time_s = at.driven_s.left = at.driven_s.right = 50;
+    for (const Effect& effect : scene.effects) {
+      ASSERT_NE(static_cast<bool>(effect.push), static_cast<bool>(effect.see)) << scene.about;
+      ASSERT_EQ(effect.named_by.size(), 1u);
+      for (const std::string& c : effect.named_by.front()) kinds.insert(c);
+      Push push;
+      View view{{10, 20}, 0.5};
+      if (effect.push) effect.push(at, push);
+      if (effect.see) effect.see(at, view);
+      // Speeds keep their sign; nothing is beyond what a laboratory would see.
+      EXPECT_GT(push.gain.left, 0.25) << scene.about;
+      EXPECT_LT(push.gain.left, 1.7) << scene.about;
+      EXPECT_LE(std::hypot(push.drift_mm_s.x, push.drift_mm_s.y), 4) << scene.about;
+      EXPECT_LE(std::abs(push.slip_mm_s.y), 4) << scene.about;
+      EXPECT_LE(std::abs(push.turn_rad_s), 0.25) << scene.about;
+      EXPECT_LE(std::hypot(view.point.x - 10, view.point.y - 20), 20.001) << scene.about;
+      EXPECT_LE(std::abs(view.heading_rad - 0.5), 0.35) << scene.about;
+    }
+  }
+  // One in three has two effects; 40 to 95 of 200 with a chance of more than 0.9999.
+  EXPECT_GE(pairs, 40);
+  EXPECT_LE(pairs, 95);
+  for (const char* kind : {"time", "position", "heading", "robot", "command", "history", "motor_time",
+                           "time_since_command", "neighbours", "measurement"})
+    EXPECT_TRUE(kinds.contains(kind)) << kind;
+}
+
 }  // namespace kilotwin::truth
