@@ -65,7 +65,7 @@ TEST(CommandLag, GoesWithATermThatExplainsIt) {
   FitState base(set);
   const Fitter fitter(set, 2);
   fitter.fit_base(base);
-  // What looks like one at first.
+  // At first it looks like a lag.
   FitState late = base;
   ASSERT_GT(fitter.fit_command_lag(late), 0);
   EXPECT_GT(late.model.base.command_lag_s, 0.3);

@@ -177,7 +177,7 @@ Profile drawn_profile(Dice& dice, const Scene& scene, bool of_sight) {
   }
 }
 
-/// What an effect of value 1 does.
+/// The action of an effect, times its value f.
 struct Action {
   std::string words;
   std::string covariate;  ///< the one that names what it acts on; may be empty

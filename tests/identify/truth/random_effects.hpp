@@ -7,8 +7,8 @@
 
 namespace kilotwin::truth {
 
-/// A scene with one random effect, in one set of three with two. What acts (speed, one wheel, turn rate, drift, slip, camera, compass), on
-/// which one or two covariates it depends, and by which functions, depends on `seed`; so does the laboratory.
+/// A scene with one random effect, in one set of three with two, in a laboratory of a random kind. An effect acts on the speed, one wheel,
+/// the turn rate, drift, slip, camera or compass, and depends on one or two covariates by random functions. All follows from `seed`.
 Scene random_effects(std::uint64_t seed);
 
 }  // namespace kilotwin::truth
