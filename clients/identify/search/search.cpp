@@ -153,6 +153,7 @@ class Loop {
       failed_.insert({Attempt::Kind::kNamed, {name}});
       return false;
     }
+    separate_last();
     eliminate_earlier();
     fitter_.fit_contacts(out_.fit);
     try_camera_motion();
@@ -546,11 +547,6 @@ class Loop {
       refine_curves(fitter_, out_.fit, place);
     // Smooth curves leave residuals of a switch, which would pass the tests as one further term after another.
     if (became_switch(place)) return;
-    // So does a sum of products of what is one product.
-    if (separate(fitter_, out_.fit, place)) {
-      extend_targets(fitter_, out_.fit, place);
-      return;
-    }
     const std::string before = out_.fit.model.terms[place].name;
     if (refine_wave_numbers(fitter_, out_.fit, place)) refit(fitter_, out_.fit, place);
     if (refine_moving_circle(fitter_, out_.fit, place)) {
@@ -613,27 +609,42 @@ class Loop {
       const auto place = static_cast<std::size_t>(t);
       const Finding own = score_test_->evidence_of_term(t);
       if (own.held_out < 2 && removed(place, false)) return true;
-      std::vector<const Hypothesis*> others;
-      for (const Hypothesis& h : dictionary_.hypotheses) {
-        if (h.log_choices > kManyChoices && h.name != out_.fit.model.terms[place].name) continue;
-        // Amplitudes of this term's curve are no alternative: they contain the curve.
-        if (!multiplies_term(out_.fit.model, dictionary_.term_of(h, 1))) others.push_back(&h);
-      }
-      const std::vector<Finding> findings = score_test_->evidence_of_each(others, t);
-      const Hypothesis* best = nullptr;
-      Finding best_finding;
-      for (std::size_t h = 0; h < others.size(); ++h) {
-        if (best != nullptr && !(findings[h].evidence > best_finding.evidence)) continue;
-        best = others[h];
-        best_finding = findings[h];
-      }
-      if (best == nullptr || best->name == out_.fit.model.terms[place].name ||
-          best_finding.evidence <= own.evidence + std::max(kClose, kRemnant * own.evidence) ||
-          failed_.contains({Attempt::Kind::kExchange, {best->name, out_.fit.model.terms[place].name}}))
-        continue;
-      if (exchanged_for(place, *best, best_finding)) return true;
+      if (exchanged(place, own)) return true;
     }
     return false;
+  }
+  /// Exchanges a term, whose evidence is `own`, for the hypothesis with the most evidence in its place, if that is clearly larger.
+  bool exchanged(std::size_t place, const Finding& own) {
+    const std::string& name = out_.fit.model.terms[place].name;
+    std::vector<const Hypothesis*> others;
+    for (const Hypothesis& h : dictionary_.hypotheses) {
+      if (h.log_choices > kManyChoices && h.name != name) continue;
+      // Amplitudes of this term's curve are no alternative: they contain the curve.
+      if (!multiplies_term(out_.fit.model, dictionary_.term_of(h, 1))) others.push_back(&h);
+    }
+    const std::vector<Finding> findings = score_test_->evidence_of_each(others, static_cast<int>(place));
+    const Hypothesis* best = nullptr;
+    Finding best_finding;
+    for (std::size_t h = 0; h < others.size(); ++h) {
+      if (best != nullptr && !(findings[h].evidence > best_finding.evidence)) continue;
+      best = others[h];
+      best_finding = findings[h];
+    }
+    return best != nullptr && best->name != name &&
+           best_finding.evidence > own.evidence + std::max(kClose, kRemnant * own.evidence) &&
+           !failed_.contains({Attempt::Kind::kExchange, {best->name, name}}) &&
+           exchanged_for(place, *best, best_finding);
+  }
+  /// Replaces the last term, of two covariates, by a product of two functions: its columns leave residuals that would pass the tests as one
+  /// further term after another. First, another hypothesis may replace it: a product can resemble much.
+  void separate_last() {
+    const std::size_t last = out_.fit.model.terms.size() - 1;
+    FitState product = out_.fit;
+    if (!separate(fitter_, product, last)) return;
+    score_dictionary();
+    if (exchanged(last, score_test_->evidence_of_term(static_cast<int>(last)))) return;
+    out_.fit = std::move(product);
+    extend_targets(fitter_, out_.fit, last);
   }
   /// Exchanges a term for another hypothesis. The quadratic approximation may overestimate its evidence: restores
   /// the state if the likelihood falls.
