@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 
 #include "clients/identify/data/command_response.hpp"
 #include "clients/identify/data/data_faults.hpp"
@@ -15,9 +16,10 @@ namespace {
 constexpr double kSlowestClock = 0.5, kFastestClock = 2;
 // Grid of clock rates: neighbouring rates move the end of the compared interval by this time.
 constexpr double kStep_s = 0.4;
-// A run's clock is wrong if another rate passes three bounds: gain in log-likelihood per robot and hundred motion
-// segments, total gain, and shift of the run's end.
-constexpr double kClockGainShare = 0.08, kClockGain = 60, kClockShift_s = 3;
+// A run's clock is wrong if another rate passes four bounds: gain in log-likelihood per robot and hundred motion
+// segments, total gain, shift of the run's end, and the total gain in standard errors over robots. Of a right clock, another rate
+// suits some robots by chance, and suits others badly.
+constexpr double kClockGainShare = 0.08, kClockGain = 60, kClockShift_s = 3, kClockErrors = 3;
 // Upper bound on the robots of a run whose tracks are used to estimate its clock rate.
 constexpr std::size_t kClockTracks = 16;
 
@@ -25,6 +27,15 @@ struct ClockTrack {
   const Track* track;
   std::vector<MotionSegment> segments;
 };
+
+/// 0 of a single value, which tells none.
+double standard_error_of_sum(const std::vector<double>& values) {
+  const auto n = static_cast<double>(values.size());
+  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
+  double squares = 0;
+  for (const double value : values) squares += (value - mean) * (value - mean);
+  return n < 2 ? 0 : std::sqrt(squares * n / (n - 1));
+}
 
 /// Log-likelihood of all motion segments before `until_s` (stamped time) if stamped time is `rate` times true
 /// time.
@@ -270,9 +281,12 @@ void exclude_wrong_clocks(MeasuredSet& set, std::vector<DataFault>& faults) {
     }
     if (segments < 100 || end_s < 20) continue;
     const double rate = best_rate(clock_tracks, response, end_s);
-    const double gain = of_rate(clock_tracks, response, rate, end_s) - of_rate(clock_tracks, response, 1, end_s);
-    if (gain < kClockGain || gain < kClockGainShare * static_cast<double>(segments) ||
-        std::abs(rate - 1) * end_s < kClockShift_s)
+    std::vector<double> gains;
+    for (const ClockTrack& one : clock_tracks)
+      gains.push_back(of_rate({one}, response, rate, end_s) - of_rate({one}, response, 1, end_s));
+    const double gain = std::accumulate(gains.begin(), gains.end(), 0.0);
+    if (!(gain > kClockErrors * standard_error_of_sum(gains)) || gain < kClockGain ||
+        gain < kClockGainShare * static_cast<double>(segments) || std::abs(rate - 1) * end_s < kClockShift_s)
       continue;
     faults.push_back(
         {DataFault::Kind::kClock, run.name, std::nullopt, std::nullopt, begin_s, end_s, rate, samples});
