@@ -146,6 +146,7 @@ TEST(RandomEffects, FollowTheirSeed) {
     const std::vector<Vec> discs(static_cast<std::size_t>(scene.robots), Vec{40, 30});
     at.discs = &discs;
     at.motion = Motion::kStraight;
+    at.robot = 39;  // of a scene that was made larger
     at.time_s = at.driven_s.left = at.driven_s.right = 50;
     for (const Effect& effect : scene.effects) {
       ASSERT_NE(static_cast<bool>(effect.push), static_cast<bool>(effect.see)) << scene.about;

@@ -49,8 +49,8 @@ constexpr double kRemnant = 0.003;
 constexpr std::size_t kEnoughSamples = 130000;
 /// The same for general terms, which have more columns.
 constexpr std::size_t kEnoughForGeneral = 70000;
-/// The same where the error that is left looks like noise: enough for a clear effect. Such an effect must pass by these margins beyond
-/// the thresholds, because the error itself gives no reason to look for one.
+/// The same where the error that is left looks like noise: enough for a clear effect. Such an effect must pass these
+/// bounds, with a p so much below the threshold, because the error itself gives no reason to look for one.
 constexpr std::size_t kEnoughForScreening = 25000;
 constexpr double kClearEvidence = 15, kClearLog10P = 2, kClearHeldOut = 8;
 /// General terms that are tried in one round.

@@ -66,7 +66,7 @@ int main(int argc, char** argv) {
       return 0;
     }
     if (name.empty()) return usage();
-    // Sets by seed: of that of the scene.
+    // The seed in the name of a set is also that of its play.
     if (const std::size_t colon = name.find(':'); colon != std::string::npos)
       seed = std::stoull(name.substr(colon + 1));
     const Scene scene = scenario(name);

@@ -105,7 +105,7 @@ Profile of_heading(Dice& dice) {
           [=](const Situation& at) { return 0.5 + 0.5 * std::cos(folds * at.heading_rad + phase); }};
 }
 
-/// Some robots, all alike.
+/// Some robots, all alike. The pattern repeats in a scene that was made larger than the laboratory.
 Profile of_robots(Dice& dice, const Scene& scene) {
   auto some = std::make_shared<std::vector<double>>();
   std::string which;
@@ -114,7 +114,7 @@ Profile of_robots(Dice& dice, const Scene& scene) {
     if (some->back() > 0) which += fmt::format(" {}", i);
   }
   return {"robot", "1 for robots" + which,
-          [=](const Situation& at) { return (*some)[static_cast<std::size_t>(at.robot)]; }};
+          [=](const Situation& at) { return (*some)[static_cast<std::size_t>(at.robot) % some->size()]; }};
 }
 
 Profile of_commands(Dice& dice) {
