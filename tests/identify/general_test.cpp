@@ -69,7 +69,7 @@ TEST(CommandLag, GoesWithATermThatExplainsIt) {
   FitState late = base;
   ASSERT_GT(fitter.fit_command_lag(late), 0);
   EXPECT_GT(late.model.base.command_lag_s, 0.3);
-  const identify::Search found = identify::search(fitter, base, identify::WorkLog({}));
+  const identify::Search found = identify::search(fitter, late, identify::WorkLog({}));
   EXPECT_NEAR(found.fit.model.base.command_lag_s, 0, 0.02);
   ASSERT_FALSE(found.fit.model.terms.empty());
   EXPECT_EQ(found.fit.model.terms.front().name, "inertia-by-command");

@@ -664,6 +664,7 @@ bool separate(const Fitter& fitter, FitState& state, std::size_t place) {
                      {with_known(pair.one, one.one, target), with_known(pair.other, one.other, target)});
   product.fit();
   const std::vector<Factor> functions = functions_of(trial.model.terms[place]);
+  if (functions.empty()) return false;
   for (const OneTarget& other : targets)
     if (&other != &main) add_target(trial.model.terms[place], functions, other.term.blocks.front());
   if (targets.size() > 1) fitter.fit(trial, 2);

@@ -153,7 +153,8 @@ class Loop {
       failed_.insert({Attempt::Kind::kNamed, {name}});
       return false;
     }
-    separate_last();
+    // A finding may have refined an earlier term instead.
+    if (out_.fit.model.terms.size() > before.fit.model.terms.size()) separate_last();
     eliminate_earlier();
     fitter_.fit_contacts(out_.fit);
     try_camera_motion();
@@ -414,8 +415,8 @@ class Loop {
     add_candidates(dictionary_of_circles(out_.fit, extent_, circles), false, kRemnant * explained(), best);
     return !best.empty() && fits(std::move(best.begin()->second), attempt);
   }
-  /// Adds the general term with the most evidence that fits. If little is left unexplained by its own expectation, only a clear one: an
-  /// effect that looks like noise raises what the model expects of itself. Returns whether there is one.
+  /// Adds the general term with the most evidence that fits. If the error is near what the model expects, only a clear one: an effect
+  /// that looks like noise raises what the model expects. Returns whether there is one.
   bool accept_general() {
     if (general_terms_ == kMostGeneral || !limit().empty() || !leaves_much_) return false;
     say(kGeneralTerms, "testing general terms");

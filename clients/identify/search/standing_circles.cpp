@@ -29,7 +29,7 @@ constexpr double kLoss = 10, kLossShare = 0.05;
 /// are tried.
 constexpr double kLeastOfEach = 0.25, kLeastCurves = 0.15;
 /// Work that circles may cost: a share of that of the search, between these bounds. Beyond, the map stays unless circles so far are
-/// better. Two patches cost 1.3 times their search in a small set, of which most is soon over.
+/// better. In a small set, two patches cost 1.3 times their search; the lower bound is enough for that.
 constexpr double kShareOfWork = 0.8, kLeastWork = 5e7, kMostOfWork = 1.5e8;
 /// Prior standard deviation of the coefficients before their first fit: of gains, or of rad/s.
 constexpr double kPriorSd = 0.3;
@@ -317,7 +317,7 @@ bool lies_within(const Term& term, const Extent& e) {
 /// Returns whether circles replaced the map.
 bool replace_by_circles(const Fitter& fitter, FitState& state, std::size_t place, std::uint64_t most_work) {
   const std::optional<Target> target = target_of_map(state.model.terms[place]);
-  if (!target) return false;
+  if (!target || state.tracks.work() >= most_work) return false;
   const Extent extent = extent_of(state.tracks);
   std::vector<MapPoint> map = positions_of(state.tracks);
   add_effect(map, state.model.terms[place], *target, 1);
