@@ -96,6 +96,7 @@ struct MovingPoint {
   double x_mm = 0, y_mm = 0;  ///< at the start of the run
   double velocity_x_mm_s = 0, velocity_y_mm_s = 0, growth_mm_s = 0;
 
+  [[nodiscard]] bool stands() const { return velocity_x_mm_s == 0 && velocity_y_mm_s == 0 && growth_mm_s == 0; }
   [[nodiscard]] double x_mm_at(double time_s) const { return x_mm + velocity_x_mm_s * time_s; }
   [[nodiscard]] double y_mm_at(double time_s) const { return y_mm + velocity_y_mm_s * time_s; }
   bool operator==(const MovingPoint&) const = default;

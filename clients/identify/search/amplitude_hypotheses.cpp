@@ -62,7 +62,7 @@ std::optional<Multiplied> multiplied_by(const Term& term) {
     if (out.is_of(word)) return std::nullopt;
     out.name += (out.name.empty() ? "" : "-and-") + name;
     out.words.push_back(word);
-    if (factor.axis.of != Covariate::kPointDistance) continue;
+    if (factor.axis.of != Covariate::kPointDistance || factor.axis.point.stands()) continue;
     out.name += "-and-time";
     out.words.emplace_back("time");
   }

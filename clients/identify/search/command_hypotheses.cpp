@@ -94,6 +94,12 @@ void add_motor_time_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   make.curve(kSpeed, "motor-time", {"motor_time"}, both, {1, 3, 8}, false);
   const Basis driven{{over(Shape::kCosines, Covariate::kDrivenTime, 0, extent.driven_s, 6)}};
   make.curve(kTurning, "driven-time", {"motor_time"}, driven, {1, 3, 6}, false);
+  // Slips and drifts have no constant elsewhere.
+  Basis whole = driven;
+  whole.factors.front().first = 0;
+  whole.factors.front().count = 4;
+  for (const TargetGroup* group : {&kSlip, &kWorld})
+    make.add(*group, "driven-time", {"motor_time"}, some(make.put(*group, whole), 0, 4));
 }
 
 void add_command_hypotheses(DictionaryBuilder& make, const Extent& extent) {
@@ -130,7 +136,13 @@ void add_command_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   make.curve(kSpeed, "time-since-command", {"time_since_command"}, start, {1, 3, 8}, false);
   make.curve(kTurning, "time-since-command", {"time_since_command"}, start, {1, 3, 8}, false);
   make.curve(kSlip, "time-since-command", {"time_since_command"}, start, {3}, false);
+  // A drift has no constant elsewhere.
+  since.first = 0;
+  since.count = 4;
+  make.add(kWorld, "time-since-command", {"time_since_command"}, some(make.put(kWorld, Basis{{since}}), 0, 4));
   if (n == 1) return;
+  make.add(kWorld, "command", {"command"}, some(make.put(kWorld, which), 0, n));
+  since.first = 1;
   since.count = 3;
   const Basis each{{keyed(Shape::kTable, Covariate::kCommand, moving), since}};
   for (const TargetGroup* group : {&kSpeed, &kTurning})

@@ -136,6 +136,22 @@ void add_other_pairs(DictionaryBuilder& make, const Extent& extent) {
   if (extent.headings) add_pair(make, kCompass, place_part(extent, 3), heading_part(2));
 }
 
+/// Drifts and slips beside those over place and time.
+void add_pairs_of_drifts(DictionaryBuilder& make, const Extent& extent) {
+  const bool commands = extent.has_straight && extent.has_turns;
+  for (const TargetGroup* group : {&kWorld, &kSlip}) {
+    std::vector<Part> parts{time_part(extent, 4), place_part(extent, 2), since_part(extent, 3)};
+    if (extent.has_stop) parts.push_back(motor_part(extent, 3));
+    if (commands) parts.push_back(command_part(extent));
+    if (extent.neighbours) parts.push_back(nearest_part(2));
+    for (std::size_t i = 0; i < parts.size(); ++i)
+      for (std::size_t j = i + 1; j < parts.size(); ++j)
+        if (group == &kSlip || !(i == 0 && j == 1)) add_pair(make, *group, parts[i], parts[j]);
+    if (extent.robots.size() < 2) continue;
+    for (const Part& part : parts) add_pair(make, *group, robot_part(extent), part);
+  }
+}
+
 void add_pairs_with_neighbours(DictionaryBuilder& make, const Extent& extent) {
   if (!extent.neighbours) return;
   Factor around = over(Shape::kHarmonics, Covariate::kBearing, 0, 1, 3);
@@ -160,7 +176,7 @@ void add_pairs_with_neighbours(DictionaryBuilder& make, const Extent& extent) {
 std::vector<Dictionary> general_dictionaries_of(const Extent& extent) {
   std::vector<Dictionary> all;
   for (const auto add : {add_maps_over_time, add_drifts_over_time, add_pairs_with_robots, add_courses_of_runs,
-                         add_other_pairs, add_pairs_with_neighbours}) {
+                         add_other_pairs, add_pairs_of_drifts, add_pairs_with_neighbours}) {
     Dictionary dictionary;
     DictionaryBuilder make(dictionary);
     add(make, extent);

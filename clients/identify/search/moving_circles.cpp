@@ -149,9 +149,25 @@ MovingPoint shifted_centre(MovingPoint p, const Eigen::VectorXd& step_mm, double
   return p;
 }
 
-/// Sets velocity, growth or both to 0 if that is as likely. Returns whether one of them is 0 now that was not.
+/// Whether a circle changes so little during a run that the scan would have left it out.
+bool hardly_moves(const MovingPoint& p, const Extent& extent) {
+  return extent.duration_s * (std::hypot(p.velocity_x_mm_s, p.velocity_y_mm_s) + std::abs(p.growth_mm_s)) <
+         kStill * spacing_of(extent);
+}
+
+/// Sets velocity, growth or both to 0 if that is as likely. A circle that hardly moves may also fit what its curve does not, a
+/// strength of each robot: then, standing, it may lose a share of what it explains. Returns whether one of them is 0 now that was not.
 bool set_still(const Fitter& fitter, FitState& state, std::size_t place, double likelihood) {
   constexpr double kPerNumber = 3;  // as the choice of one number costs
+  constexpr double kShare = 0.05;
+  double may_lose = 0;
+  if (hardly_moves(state.model.terms[place].blocks.front().basis.factors.front().axis.point,
+                   extent_of(state.tracks))) {
+    FitState without = state;
+    without.model.terms.erase(without.model.terms.begin() + static_cast<std::ptrdiff_t>(place));
+    fitter.fit(without, 1);
+    may_lose = kShare * (likelihood - fitter.log_likelihood(without));
+  }
   const MovingPoint now = state.model.terms[place].blocks.front().basis.factors.front().axis.point;
   const bool moves = now.velocity_x_mm_s != 0 || now.velocity_y_mm_s != 0, grows = now.growth_mm_s != 0;
   for (const auto& [still, constant] : {std::pair{true, true}, std::pair{true, false}, std::pair{false, true}}) {
@@ -162,7 +178,8 @@ bool set_still(const Fitter& fitter, FitState& state, std::size_t place, double 
     FitState trial = state;
     set_centre(trial.model.terms[place], trial_centre);
     fitter.fit(trial, 2);
-    if (!(fitter.log_likelihood(trial) > likelihood - kPerNumber * ((still ? 2 : 0) + (constant ? 1 : 0))))
+    if (!(fitter.log_likelihood(trial) >
+          likelihood - std::max(may_lose, kPerNumber * ((still ? 2 : 0) + (constant ? 1 : 0)))))
       continue;
     state = std::move(trial);
     return true;
@@ -279,8 +296,7 @@ bool refine_moving_circle(const Fitter& fitter, FitState& state, std::size_t pla
   bool changed = move_numbers(fitter, state, steps, likelihood);
   changed = set_still(fitter, state, place, likelihood) || changed;
   const MovingPoint& centre = state.model.terms[place].blocks.front().basis.factors.front().axis.point;
-  const bool stands = centre.velocity_x_mm_s == 0 && centre.velocity_y_mm_s == 0 && centre.growth_mm_s == 0;
-  state.model.terms[place].name = stands ? "speed-by-position" : "speed-by-position-and-time";
+  state.model.terms[place].name = centre.stands() ? "speed-by-position" : "speed-by-position-and-time";
   return changed;
 }
 

@@ -34,6 +34,7 @@ void add_neighbour_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   const Factor close = with_radius(over(Shape::kTaper, Covariate::kNearest, 0, kNeighbourRadii_mm[6], 2), 6);
   const auto spun = make.put(kTurning, Basis{{close}});
   make.add(kTurning, "neighbours", {"neighbours"}, some(spun, 0, 2), 6);
+  make.add(kWorld, "neighbours", {"neighbours"}, some(make.put(kWorld, Basis{{close}}), 0, 2));
   for (const std::uint8_t r : kSought) {
     const Factor count = with_radius(over(Shape::kCosines, Covariate::kNeighbours, 0, 8, 3), r);
     const auto bases = make.put(kSpeed, Basis{{count}});

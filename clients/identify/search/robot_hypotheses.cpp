@@ -21,6 +21,7 @@ void add_robot_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   // A bent leg, a rotated marker.
   const Basis each{{keyed(Shape::kTable, Covariate::kRobot, keys)}};
   make.add(kSlip, "robot", {"robot"}, some(make.put(kSlip, each), 0, n));
+  make.add(kWorld, "robot", {"robot"}, some(make.put(kWorld, each), 0, n));
   if (extent.headings) make.add(kCompass, "robot", {"robot"}, some(make.put(kCompass, each), 0, n));
   const auto ahead = make.put(Target::kMeasuredAhead, each, kAlways),
              left = make.put(Target::kMeasuredLeft, each, kAlways);

@@ -24,6 +24,10 @@ std::vector<Eigen::Index> add_time_hypotheses(DictionaryBuilder& make, const Ext
   };
   make.curve(kSpeed, "time", {"time"}, smooth(32), {1, 3, 8, 16, 32}, true);
   make.curve(kTurning, "time", {"time"}, smooth(12), {1, 3, 12}, true);
+  // A slip has no constant elsewhere.
+  Basis slipping = smooth(8);
+  slipping.factors.front().first = 0;
+  make.curve(kSlip, "time", {"time"}, slipping, {2, 4, 8}, false);
   const auto drift = make.curve(kWorld, "time", {"time"}, smooth(32), {1, 3, 8, 16, 32}, true);
   // The camera may drift, rotate and change its scale, separately or together.
   const auto aside = make.put(kCamera, smooth(16));
@@ -67,6 +71,11 @@ std::vector<Eigen::Index> add_place_hypotheses(DictionaryBuilder& make, const Ex
   };
   map(kSpeed, 8);
   map(kTurning, 3);
+  Factor slipping = plane(extent, 3);
+  slipping.first = 0;
+  const auto slip = make.put(kSlip, Basis{{slipping}});
+  for (const Eigen::Index order : {1, 2, 3})
+    make.add(kSlip, "position", {"position"}, some(slip, 0, (order + 1) * (order + 2) / 2));
   const auto drift = map(kWorld, 5);
   map(kCamera, 5);
   // Lenses and tilts distort most at the border, where cosines are flat: polynomials. Their range may exceed the

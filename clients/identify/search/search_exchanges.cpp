@@ -1,0 +1,186 @@
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "clients/identify/search/amplitudes.hpp"
+#include "clients/identify/search/products.hpp"
+#include "clients/identify/search/search_loop.hpp"
+#include "clients/identify/search/target_extension.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+/// Hypotheses with more alternatives (as a logarithm) than this, single steps and pulses, are no alternatives in an exchange.
+constexpr double kManyChoices = 2.5;
+/// Largest loss of log likelihood in an exchange: with few columns, and with the refined shape.
+constexpr double kMostByShape = 200, kAsGood = 10;
+/// Hypotheses with this share of the best evidence are kept as alternatives: the order may change after shape refinement.
+constexpr double kAlternativeShare = 0.97;
+
+}  // namespace
+
+bool SearchLoop::eliminate() {
+  if (eliminations_++ >= 3) return false;
+  for (int t = 0; t < static_cast<int>(out_.fit.model.terms.size()) && !worked_out(); ++t) {
+    const auto place = static_cast<std::size_t>(t);
+    const Finding own = score_test_->evidence_of_term(t);
+    if (own.held_out < 2 && removed(place, false)) return true;
+    if (exchanged(place, own)) return true;
+  }
+  return false;
+}
+
+bool SearchLoop::exchanged(std::size_t place, const Finding& own) {
+  const std::string& name = out_.fit.model.terms[place].name;
+  std::vector<const Hypothesis*> others;
+  for (const Hypothesis& h : dictionary_.hypotheses) {
+    if (h.log_choices > kManyChoices && h.name != name) continue;
+    // Amplitudes of this term's curve are no alternative: they contain the curve.
+    if (!multiplies_term(out_.fit.model, dictionary_.term_of(h, 1))) others.push_back(&h);
+  }
+  const std::vector<Finding> findings = score_test_->evidence_of_each(others, static_cast<int>(place));
+  const Hypothesis* best = nullptr;
+  Finding best_finding;
+  for (std::size_t h = 0; h < others.size(); ++h) {
+    if (best != nullptr && !(findings[h].evidence > best_finding.evidence)) continue;
+    best = others[h];
+    best_finding = findings[h];
+  }
+  return best != nullptr && best->name != name &&
+         best_finding.evidence > own.evidence + std::max(kClose, kRemnant * own.evidence) &&
+         !failed_.contains({Attempt::Kind::kExchange, {best->name, name}}) &&
+         exchanged_for(place, *best, best_finding);
+}
+
+void SearchLoop::separate_last() {
+  const std::size_t last = out_.fit.model.terms.size() - 1;
+  FitState product = out_.fit;
+  if (!separate(fitter_, product, last)) return;
+  score_dictionary();
+  if (exchanged(last, score_test_->evidence_of_term(static_cast<int>(last)))) return;
+  out_.fit = std::move(product);
+  extend_targets(fitter_, out_.fit, last);
+}
+
+bool SearchLoop::exchanged_for(std::size_t place, const Hypothesis& other, Finding finding) {
+  const Search before = out_;
+  // Contacts show whether the robots move or the camera does.
+  const auto acts_on_camera = [&] { return is_measured(out_.fit.model.terms[place].blocks.front().target); };
+  const bool was_on_camera = acts_on_camera();
+  // With the disc centres of the state before.
+  const double likelihood = fitter_.log_likelihood(out_.fit),
+               likelihood_of_all = fitter_.log_likelihood_of_all(out_.fit);
+  finding.log10_p = out_.reasons[place].finding.log10_p;
+  out_.fit.model.terms[place] = dictionary_.term_of(other, finding.relative_scale);
+  out_.reasons[place] = {other.covariates, other.acts_on, finding, out_.reasons[place].threshold_log10_p};
+  fitter_.fit(out_.fit, 2);
+  if (was_on_camera != acts_on_camera()) {
+    refine_shape(place);
+    fitter_.fit_contacts(out_.fit);
+    if (fitter_.log_likelihood_of_all(out_.fit) > likelihood_of_all - kAsGood) return true;
+  } else {
+    // Shape refinement can recover a part of the difference only.
+    if (fitter_.log_likelihood(out_.fit) > likelihood - kMostByShape) {
+      refine_shape(place);
+      if (fitter_.log_likelihood(out_.fit) > likelihood - kAsGood) return true;
+    }
+  }
+  out_ = before;
+  failed_.insert({Attempt::Kind::kExchange, {other.name, out_.fit.model.terms[place].name}});
+  return false;
+}
+
+void SearchLoop::try_camera_motion() {
+  const auto drift = std::find_if(out_.fit.model.terms.begin(), out_.fit.model.terms.end(),
+                                  [](const Term& term) { return term.name == "drift-by-time"; });
+  // Once only: otherwise the search could alternate between both.
+  if (drift == out_.fit.model.terms.end() ||
+      !failed_.insert({Attempt::Kind::kExchange, {"camera-by-time", "drift-by-time"}}).second)
+    return;
+  const auto place = static_cast<std::size_t>(drift - out_.fit.model.terms.begin());
+  const bool at_rest = std::any_of(drift->blocks.begin(), drift->blocks.end(),
+                                   [](const Block& block) { return (block.during & ~kDriven) != 0; });
+  score_dictionary();
+  const Hypothesis* best = nullptr;
+  Finding best_finding;
+  for (const Hypothesis& h : dictionary_.hypotheses) {
+    if (h.name != "camera-by-time") continue;
+    const Finding finding = score_test_->evidence_of(h, static_cast<int>(place));
+    if (best != nullptr && !(finding.evidence > best_finding.evidence)) continue;
+    best = &h;
+    best_finding = finding;
+  }
+  constexpr double kAlike = 0.8;
+  if (best == nullptr || (!at_rest && best_finding.evidence <
+                                          kAlike * score_test_->evidence_of_term(static_cast<int>(place)).evidence))
+    return;
+  exchanged_for(place, *best, best_finding);
+}
+
+bool SearchLoop::is_constant_of(const Term& term, const Term& other) {
+  return std::all_of(term.blocks.begin(), term.blocks.end(), [&](const Block& block) {
+    return block.basis.factors.empty() &&
+           std::any_of(other.blocks.begin(), other.blocks.end(), [&](const Block& b) {
+             return b.target == block.target && (b.during & block.during) == block.during;
+           });
+  });
+}
+
+void SearchLoop::eliminate_earlier() {
+  if (multiplies_term(out_.fit.model, out_.fit.model.terms.back())) return;
+  constexpr double kFarLess = 0.1;
+  for (std::size_t t = out_.fit.model.terms.size() - 1; t-- > 0;) {
+    const Term &earlier = out_.fit.model.terms[t], &last = out_.fit.model.terms.back();
+    const bool far_less = out_.reasons.back().finding.evidence < kFarLess * out_.reasons[t].finding.evidence;
+    if ((!far_less || is_constant_of(earlier, last)) && earlier.name != last.name) removed(t, true);
+  }
+}
+
+bool SearchLoop::removed(std::size_t t, bool shape_last) {
+  const Search before = out_;
+  const double evidence = fitter_.log_evidence(out_.fit);
+  out_.fit.model.terms.erase(out_.fit.model.terms.begin() + static_cast<std::ptrdiff_t>(t));
+  out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(t));
+  fitter_.fit(out_.fit, shape_last ? 2 : 1);
+  if (shape_last) refine_shape(out_.fit.model.terms.size() - 1);
+  if (fitter_.log_evidence(out_.fit) > evidence - kClose) return true;
+  out_ = before;
+  return false;
+}
+
+void SearchLoop::note_alternatives(const Finding& best, const ScoreTest::Outcome& outcome) {
+  const std::string& chosen = hypothesis(best).name;
+  alternatives_ = {out_, chosen, {}};
+  std::map<std::string, double> most;
+  for (const Finding& f : outcome.findings) {
+    const Hypothesis& h = hypothesis(f);
+    if (f.evidence < std::max(kAlternativeShare * best.evidence, most[h.name]) || h.name == chosen) continue;
+    most[h.name] = f.evidence;
+    alternatives_.by_name[h.name] = {dictionary_.term_of(h, f.relative_scale),
+                                     {h.covariates, h.acts_on, f, outcome.threshold_log10_p}};
+  }
+}
+
+bool SearchLoop::replaced_by_alternative(const std::string& name) {
+  const auto c = alternatives_.by_name.find(name);
+  if (c == alternatives_.by_name.end() ||
+      out_.fit.model.terms.size() != alternatives_.before->fit.model.terms.size() + 1 ||
+      out_.fit.model.terms.back().name != alternatives_.chosen)
+    return false;
+  const auto [term, reason] = c->second;
+  alternatives_.by_name.erase(c);
+  const Search now = out_;
+  const double evidence = fitter_.log_evidence(now.fit);
+  out_ = *alternatives_.before;
+  out_.fit.model.terms.push_back(term);
+  out_.reasons.push_back(reason);
+  fitter_.fit(out_.fit, 2);
+  refine_shape(out_.fit.model.terms.size() - 1);
+  fitter_.fit_contacts(out_.fit);
+  out_.steps.push_back({term.name, reason.finding.held_out});
+  if (fitter_.log_evidence(out_.fit) > evidence) return true;
+  out_ = now;
+  return false;
+}
+
+}  // namespace kilotwin::identify

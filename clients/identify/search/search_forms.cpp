@@ -1,0 +1,179 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "clients/identify/search/moving_circles.hpp"
+#include "clients/identify/search/search_loop.hpp"
+#include "clients/identify/search/travelling_waves.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+/// General terms of a search, and those that are tried in one round.
+constexpr int kMostGeneral = 3;
+constexpr std::size_t kMostTries = 4;
+/// Largest number of samples in the test of general terms, which have many columns; and where the error that is left looks like
+/// noise: enough for a clear effect.
+constexpr std::size_t kEnoughForGeneral = 70000, kEnoughForScreening = 25000;
+
+}  // namespace
+
+void SearchLoop::add_candidates(const Dictionary& family, bool general, double least_evidence, Candidates& best,
+                                bool screening) {
+  std::vector<Block> blocks = blocks_of(out_.fit.model);
+  blocks.insert(blocks.end(), family.blocks.begin(), family.blocks.end());
+  const ColumnGroups read = columns_read_by_test(out_.fit.model, family);
+  const std::vector<Unit> units =
+      linearise(out_.fit.model, tested_units(screening ? kEnoughForScreening : kEnoughForGeneral), blocks,
+                {100, fitter_.threads(), -1, &read});
+  const ScoreTest test(fitter_, out_.fit.model, units, family);
+  const ScoreTest::Outcome outcome = test.test(kSeed + 100 + static_cast<std::uint64_t>(round_));
+  for (const Finding& f : outcome.findings) {
+    const Hypothesis& h = family.hypotheses[f.hypothesis];
+    const Attempt attempt{general ? Attempt::Kind::kGeneral : Attempt::Kind::kForm, {h.name}};
+    const auto known = best.find(attempt);
+    if (!(screening ? clear(f, outcome.threshold_log10_p) : good(f, outcome.threshold_log10_p)) ||
+        f.evidence < least_evidence || failed_.contains(attempt) ||
+        (known != best.end() && f.evidence <= known->second.reason.finding.evidence))
+      continue;
+    GeneralTerm one{family.term_of(h, f.relative_scale), {h.covariates, h.acts_on, f, outcome.threshold_log10_p}};
+    one.term.general = general;
+    best.insert_or_assign(attempt, std::move(one));
+  }
+}
+
+std::vector<SearchLoop::GeneralTerm> SearchLoop::general_candidates(bool screening) {
+  if (general_.empty()) general_ = general_dictionaries_of(extent_);
+  std::vector<Dictionary> families = general_;
+  if (!screening) {
+    if (Dictionary waves = wave_dictionary_of(fitter_, out_.fit, extent_); !waves.hypotheses.empty())
+      families.push_back(std::move(waves));
+    const std::vector<MovingCircle> circles = moving_circles_of(fitter_, out_.fit, extent_);
+    if (!circles.empty()) families.push_back(dictionary_of_circles(out_.fit, extent_, circles));
+  }
+  Candidates best;
+  const double least = kRemnant * explained();
+  for (const Dictionary& family : families) {
+    // Waves and moving circles have a form of their own, with a name.
+    const bool general = static_cast<std::size_t>(&family - families.data()) < general_.size();
+    add_candidates(family, general, least, best, screening);
+  }
+  std::vector<GeneralTerm> ranked;
+  for (auto& [attempt, one] : best) ranked.push_back(std::move(one));
+  std::stable_sort(ranked.begin(), ranked.end(), [](const GeneralTerm& a, const GeneralTerm& b) {
+    return a.reason.finding.evidence > b.reason.finding.evidence;
+  });
+  if (ranked.size() > kMostTries) ranked.resize(kMostTries);
+  return ranked;
+}
+
+bool SearchLoop::fits(GeneralTerm one, const Attempt& attempt) {
+  const Search before = out_;
+  const double likelihood = fitter_.log_likelihood_of_all(out_.fit);
+  out_.steps.push_back({one.term.name, one.reason.finding.held_out});
+  out_.fit.model.terms.push_back(std::move(one.term));
+  out_.reasons.push_back(std::move(one.reason));
+  fitter_.fit(out_.fit, 2);
+  refine_shape(out_.fit.model.terms.size() - 1);
+  fitter_.fit_contacts(out_.fit);
+  if (fitter_.log_likelihood_of_all(out_.fit) >= likelihood + kLeastRise) return true;
+  out_ = before;
+  failed_.insert(attempt);
+  return false;
+}
+
+bool SearchLoop::accept_wave(double evidence) {
+  constexpr double kFewestPeriods = 1.5, kFewestStripes = 4;
+  const Attempt attempt{Attempt::Kind::kWave, {}};
+  if (failed_.contains(attempt)) return false;
+  const Dictionary waves = wave_dictionary_of(fitter_, out_.fit, extent_);
+  if (waves.hypotheses.empty()) return false;
+  Candidates best;
+  add_candidates(waves, false, evidence, best);
+  if (best.empty()) return false;
+  GeneralTerm& wave = best.begin()->second;
+  const std::vector<double>& numbers = wave.term.blocks.front().basis.factors.front().points;
+  const double periods = std::abs(numbers[2]) * extent_.duration_s / (2 * M_PI),
+               stripes = (std::abs(numbers[0]) * (extent_.x_high_mm - extent_.x_low_mm) +
+                          std::abs(numbers[1]) * (extent_.y_high_mm - extent_.y_low_mm)) /
+                         (2 * M_PI);
+  if (periods < kFewestPeriods && stripes < kFewestStripes) return false;
+  say(kAddition, "fitting " + wave.term.name);
+  return fits(std::move(wave), attempt);
+}
+
+bool SearchLoop::may_be_part_of_circle(std::size_t t) const {
+  const Reason& reason = out_.reasons[t];
+  return reason.acts_on == kSpeed.in_words && !is_moving_circle(out_.fit.model.terms[t]) &&
+         std::all_of(reason.covariates.begin(), reason.covariates.end(),
+                     [](const std::string& of) { return of == "position" || of == "time"; });
+}
+
+bool SearchLoop::has_parts_of_circle() const {
+  std::set<std::string> of;
+  for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t)
+    if (may_be_part_of_circle(t)) of.insert(out_.reasons[t].covariates.begin(), out_.reasons[t].covariates.end());
+  return of.size() == 2;
+}
+
+bool SearchLoop::accept_moving_circle(bool alone) {
+  // One amplitude within a circle explains less than its curve: the share of what the other terms explain that is worth a fit.
+  // A product that comes later may explain what the circle leaves, unless it leaves nothing.
+  const double least_share = alone ? 0.2 : 0.5;
+  Attempt attempt{alone ? Attempt::Kind::kLoneCircle : Attempt::Kind::kCircle, {}};
+  for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t)
+    if (may_be_part_of_circle(t)) attempt.names.push_back(out_.fit.model.terms[t].name);
+  if (attempt.names.empty() || worked_out() || !failed_.insert(attempt).second) return false;
+  say(kAlternatives, "testing moving circles");
+  const Search before = out_;
+  const double evidence = fitter_.log_evidence(out_.fit), likelihood = fitter_.log_likelihood_of_all(out_.fit);
+  for (std::size_t t = out_.fit.model.terms.size(); t-- > 0;) {
+    if (!may_be_part_of_circle(t)) continue;
+    out_.fit.model.terms.erase(out_.fit.model.terms.begin() + static_cast<std::ptrdiff_t>(t));
+    out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(t));
+  }
+  fitter_.fit(out_.fit, 2);
+  const double explained = likelihood - fitter_.log_likelihood_of_all(out_.fit);
+  const std::vector<MovingCircle> circles = moving_circles_of(fitter_, out_.fit, extent_);
+  if (!circles.empty() && circles.front().gain > least_share * explained) {
+    Candidates best;
+    add_candidates(dictionary_of_circles(out_.fit, extent_, circles), false, least_share * explained, best);
+    if (!best.empty() && fits(std::move(best.begin()->second), attempt) &&
+        fitter_.log_evidence(out_.fit) > evidence + kClose && !(alone && leaves_hypothesis()))
+      return true;
+  }
+  out_ = before;
+  return false;
+}
+
+bool SearchLoop::accept_further_circle() {
+  // Chance finds circles with a smaller gain in most sets.
+  constexpr double kLeastGain = 30;
+  const Attempt attempt{Attempt::Kind::kForm, {"speed-by-position-and-time"}};
+  if (!limit().empty() || failed_.contains(attempt)) return false;
+  say(kAlternatives, "testing moving circles");
+  const std::vector<MovingCircle> circles = moving_circles_of(fitter_, out_.fit, extent_);
+  if (circles.empty() || circles.front().gain < kLeastGain) return false;
+  Candidates best;
+  add_candidates(dictionary_of_circles(out_.fit, extent_, circles), false, kRemnant * explained(), best);
+  return !best.empty() && fits(std::move(best.begin()->second), attempt);
+}
+
+bool SearchLoop::accept_general() {
+  if (general_terms_ == kMostGeneral || !limit().empty() || !leaves_much_) return false;
+  say(kGeneralTerms, "testing general terms");
+  for (GeneralTerm& one : general_candidates(!leaves_much_(out_.fit))) {
+    if (worked_out()) break;
+    const Attempt attempt{one.term.general ? Attempt::Kind::kGeneral : Attempt::Kind::kForm, {one.term.name}};
+    if (!fits(std::move(one), attempt)) continue;
+    ++general_terms_;
+    --eliminations_;
+    return true;
+  }
+  if (worked_out()) out_.limit = limit();
+  return false;
+}
+
+}  // namespace kilotwin::identify

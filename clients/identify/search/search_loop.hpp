@@ -1,0 +1,200 @@
+/// The loop of a search, as its parts see it: tests of hypotheses (search_tests.cpp), additions (search.cpp), forms that no dictionary
+/// holds and general terms (search_forms.cpp), exchanges and removals (search_exchanges.cpp), shapes of terms (search_shapes.cpp).
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "clients/identify/search/dictionary_builder.hpp"
+#include "clients/identify/search/score_test.hpp"
+#include "clients/identify/search/search.hpp"
+
+namespace kilotwin::identify {
+
+/// An attempt of the search. One that failed is not repeated.
+struct Attempt {
+  enum class Kind : std::uint8_t {
+    kNamed,       ///< a hypothesis with a named form
+    kForm,        ///< a wave or a moving circle, which may have the name of a general term
+    kGeneral,     ///< a general term
+    kWave,        ///< a wave among named hypotheses
+    kLoneCircle,  ///< a moving circle in place of terms, if it leaves no hypothesis
+    kCircle,      ///< a moving circle in place of terms
+    kExchange     ///< the first hypothesis in place of a term, the second
+  };
+  Kind kind;
+  std::vector<std::string> names;
+  auto operator<=>(const Attempt&) const = default;
+};
+
+/// One search. Its state is one value, so that an attempt that fails is undone by assignment.
+class SearchLoop {
+ public:
+  SearchLoop(const Fitter&, const FitState& base, const WorkLog&,
+             const std::function<bool(const FitState&)>& leaves_much);
+  [[nodiscard]] Search run();
+
+ private:
+  static constexpr std::uint64_t kSeed = 20180729;
+  /// Effects with log evidence closer than this (a Bayes factor of 20) count as ambiguous.
+  static constexpr double kClose = 3;
+  /// Least rise of the log likelihood by a new term.
+  static constexpr double kLeastRise = 3;
+  /// No form is exact. A hypothesis that explains less than this share of the total gain counts as a remnant.
+  static constexpr double kRemnant = 0.003;
+  /// Largest number of samples in the test. More add cost and no power that is needed.
+  static constexpr std::size_t kEnoughSamples = 130000;
+
+  /// A general term that passed, with its reason.
+  struct GeneralTerm {
+    Term term;
+    Reason reason;
+  };
+  using Candidates = std::map<Attempt, GeneralTerm>;
+  /// Alternatives to the effect that was accepted last.
+  struct Alternatives {
+    std::optional<Search> before;  ///< nothing before the first round
+    std::string chosen;
+    std::map<std::string, std::pair<Term, Reason>> by_name;  ///< by name
+  };
+
+  // Rounds and additions (search.cpp).
+
+  /// Makes one change of the model: an addition, or at a limit and when nothing passes a removal or an exchange.
+  /// Returns false if there is none.
+  bool changed();
+  /// The limit that the search has reached, in one sentence; empty: none. It then adds nothing more.
+  [[nodiscard]] std::string limit() const;
+  /// Adds a hypothesis whose p fell below `threshold_log10_p`. Returns false, with the state as before, if the likelihood
+  /// does not rise by a part of the predicted gain.
+  bool accepted(const Finding& best, const ScoreTest::Outcome& outcome, double threshold_log10_p);
+  /// A lag that was fitted before a term may have been off: refits it, and takes out what it explains then.
+  void refit_lag();
+  /// A term may be what looked like a lag, as speed does that builds up after a command: it may then explain more without one, and
+  /// the small steps of a refit don't reach lag 0. Returns whether the model has no lag now.
+  bool became_punctual();
+  void say(WorkKind kind, std::string activity) const;
+  /// Whether a lag between commands and motion, one number, explains most of what the best hypothesis explains. Then
+  /// the model gets the lag.
+  bool lag_explains(const Finding& best);
+  /// Adds calibration shifts of the camera. Returns whether there were any.
+  bool accept_calibration_shifts();
+  void add(const Finding& found, double threshold);
+  /// Refines the shape of a term. Returns whether that recovers most of the expected gain of a further term.
+  bool recovered_by_refinement(std::size_t place, double expected_gain);
+  /// Whether the last term, amplitudes of an accepted curve, was merged with it.
+  bool merged();
+  [[nodiscard]] bool worked_out() const;
+  void note_stage() { out_.path.push_back({out_.fit, out_.reasons}); }
+  /// Gain in log likelihood of all accepted effects.
+  [[nodiscard]] double explained() const { return fitter_.log_likelihood_of_all(out_.fit) - base_likelihood_; }
+
+  // Tests (search_tests.cpp).
+
+  /// The tracks of the test. A large set: every n-th unit.
+  [[nodiscard]] std::vector<std::vector<const TrackView*>> tested_units(
+      std::size_t most_samples = kEnoughSamples) const;
+  void score_dictionary();
+  const Finding* best_of(const ScoreTest::Outcome& outcome, double least_evidence) const;
+  static bool of_robots_and_more(const Hypothesis& h);
+  /// Evidence of the two single effects (of robots, and of the other covariate) if either is significant: the
+  /// alternative to their combination.
+  double parts_evidence(const Hypothesis& pair, const ScoreTest::Outcome& outcome) const;
+  static bool good(const Finding& f, double threshold);
+  static bool clear(const Finding& f, double threshold);
+  /// Whether a hypothesis beside the model passes the tests and explains a fair share of what its terms explain.
+  bool leaves_hypothesis();
+  void note_rejected(const ScoreTest::Outcome& outcome);
+  void note_ambiguous(const Finding& best, const ScoreTest::Outcome& outcome);
+  const Hypothesis& hypothesis(const Finding& f) const { return dictionary_.hypotheses[f.hypothesis]; }
+
+  // Waves, moving circles and general terms (search_forms.cpp).
+
+  /// Adds the hypotheses of a family that pass the tests, of each name the one with the most evidence, by kind and name. `screening`:
+  /// only clear ones.
+  void add_candidates(const Dictionary& family, bool general, double least_evidence, Candidates& best,
+                      bool screening = false);
+  /// Those of all families, in the order of their evidence. `screening`: only clear ones.
+  std::vector<GeneralTerm> general_candidates(bool screening);
+  /// Adds a term. Returns false, with the state as before, if the likelihood does not rise. `attempt`: noted as
+  /// failed.
+  bool fits(GeneralTerm one, const Attempt& attempt);
+  /// A travelling wave with more evidence than the best hypothesis, which may be a proxy of it: adds the wave. A wave that
+  /// repeats neither within a run nor on the floor is left to the other hypotheses: it may be a proxy itself.
+  bool accept_wave(double evidence);
+  /// Whether a term is an effect of position or time on the speed, and no moving circle itself.
+  [[nodiscard]] bool may_be_part_of_circle(std::size_t t) const;
+  /// Whether effects of both position and time were found that a moving circle may replace. Its further proxies would cost many
+  /// rounds.
+  [[nodiscard]] bool has_parts_of_circle() const;
+  /// Effects of position and of time can be proxies of a circle that moves or grows: tries one in place of all of them. It stays
+  /// if the evidence of the whole model is larger. `alone`: and if no hypothesis finds much beside it. Otherwise the effects may grow
+  /// into a product that explains more.
+  bool accept_moving_circle(bool alone);
+  /// Adds a moving circle beside the other terms, if it passes the tests. Returns whether there is one.
+  bool accept_further_circle();
+  /// Adds the general term with the most evidence that fits. If the error is near what the model expects, only a clear one: an effect
+  /// that looks like noise raises what the model expects. Returns whether there is one.
+  bool accept_general();
+
+  // Removals and exchanges (search_exchanges.cpp).
+
+  /// Backward elimination and exchange. Returns whether a term was removed or replaced, so that the search must
+  /// continue.
+  bool eliminate();
+  /// Exchanges a term, whose evidence is `own`, for the hypothesis with the most evidence in its place, if that is clearly larger.
+  bool exchanged(std::size_t place, const Finding& own);
+  /// Replaces the last term, of two covariates, by a product of two functions: its columns leave residuals that would pass the tests as one
+  /// further term after another. First, another hypothesis may replace it: a product can resemble much.
+  void separate_last();
+  /// Exchanges a term for another hypothesis. The quadratic approximation may overestimate its evidence: restores
+  /// the state if the likelihood falls.
+  bool exchanged_for(std::size_t place, const Hypothesis& other, Finding finding);
+  /// Tests camera motion against a drift of the robots. Robots at rest and walls separate the two.
+  void try_camera_motion();
+  /// Whether a term is the constant part of another one.
+  static bool is_constant_of(const Term& term, const Term& other);
+  /// A new effect may explain what earlier terms were accepted for, unless it has far less evidence. Tries to
+  /// remove each earlier term, with the shape of the new one refined.
+  void eliminate_earlier();
+  /// Removes a term unless the evidence falls.
+  bool removed(std::size_t t, bool shape_last);
+  void note_alternatives(const Finding& best, const ScoreTest::Outcome& outcome);
+  /// Whether an alternative to the last accepted effect, which is now significant beside it, has more evidence in
+  /// its place.
+  bool replaced_by_alternative(const std::string& name);
+
+  // Shapes (search_shapes.cpp).
+
+  /// Refines the shape of a term. It may get another name.
+  void refine_shape(std::size_t place);
+  void refine_form(std::size_t place);
+  /// Replaces curves per robot or command by amplitudes from an instant on, and these by a change of each wheel, if the evidence
+  /// rises. Returns whether there is an instant.
+  bool became_switch(std::size_t place);
+  /// A term has got the name of another form: steps and ambiguities follow it.
+  void note_renamed(const std::string& from, const std::string& to);
+
+  const Fitter& fitter_;
+  const WorkLog& log_;
+  const std::function<bool(const FitState&)>& leaves_much_;
+  std::vector<Dictionary> general_;  ///< empty: not needed yet
+  const Extent extent_;
+  Dictionary dictionary_;  ///< hypotheses in addition to the model
+  std::optional<ScoreTest> score_test_;
+  Search out_;
+  double base_likelihood_ = 0;
+  Alternatives alternatives_;
+  std::set<Attempt> failed_;
+  int general_terms_ = 0, eliminations_ = 0, round_ = 0, failures_ = 0;
+  bool starts_anew_ = false;  ///< with a lag
+};
+
+}  // namespace kilotwin::identify
