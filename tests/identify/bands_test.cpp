@@ -171,17 +171,12 @@ TEST(HeldNumbers, OfACentreAreDifferences) {
 }
 
 /// The model of a scene with one term more, fitted.
-struct FittedTerm {
-  FittedTerm(const truth::Scene& scene, std::uint64_t seed, Term term)
-      : set(set_of(scene, played(scene, seed))), fitter(set, 2), state(set) {
-    fitter.fit_base(state);
+struct FittedTerm : BaseFit {
+  FittedTerm(const truth::Scene& scene, std::uint64_t seed, Term term) : BaseFit(scene, seed) {
     state.model.terms.push_back(std::move(term));
     fitter.fit(state, 3);
     uncertainty = uncertainty_of(fitter, state);
   }
-  MeasuredSet set;
-  Fitter fitter;
-  FitState state;
   Uncertainty uncertainty;
 };
 
@@ -270,13 +265,7 @@ TEST(StepIntervals, OfAnInstantHoldTheTruth) {
 }
 
 TEST(Uncertainty, OfTheBiasesPopulationIsThatOfASample) {
-  const MeasuredSet set = [] {
-    const truth::Scene scene = small({});
-    return set_of(scene, played(scene));
-  }();
-  const Fitter fitter(set, 2);
-  FitState state(set);
-  fitter.fit_base(state);
+  auto&& [set, fitter, state] = BaseFit(small({}));
   const Uncertainty u = uncertainty_of(fitter, state);
   // The biases of ten robots are known far better than they spread: 20 values, and a prior of four.
   const double s = state.model.base.bias_sd_mm_s;

@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <optional>
+#include <string>
+#include <utility>
 
 #include "clients/identify/fit/persistent_residuals.hpp"
 #include "clients/identify/fit/uncertainty.hpp"
@@ -35,9 +38,7 @@ TEST(CommandLag, IsFittedInPlaceOfEffects) {
       for (identify::Track& track : run.tracks)
         // All of them, the first ones too: a start with another lag is an effect of the time since the start.
         for (identify::CommandChange& change : track.commands) change.time_s -= lag_s;
-    FitState base(set);
-    const Fitter fitter(set, 2);
-    fitter.fit_base(base);
+    auto&& [late, fitter, base] = BaseFit(std::move(set));
     const identify::Search found = identify::search(fitter, base, identify::WorkLog({}));
     for (const identify::Term& term : found.fit.model.terms)
       ADD_FAILURE() << term.name << " at a lag of " << lag_s << " s";
@@ -51,20 +52,14 @@ TEST(CommandLag, IsFittedInPlaceOfEffects) {
 
 TEST(CommandLag, IsNotUsedWithoutOne) {
   const truth::Scene scene = small({});
-  const MeasuredSet set = set_of(scene, played(scene));
-  FitState base(set);
-  const Fitter fitter(set, 2);
-  fitter.fit_base(base);
+  auto&& [set, fitter, base] = BaseFit(scene);
   EXPECT_EQ(fitter.fit_command_lag(base), 0);
   EXPECT_EQ(base.model.base.command_lag_s, 0);
 }
 
 TEST(CommandLag, GoesWithATermThatExplainsIt) {
   const truth::Scene scene = small({truth::inertia()});
-  const MeasuredSet set = set_of(scene, played(scene));
-  FitState base(set);
-  const Fitter fitter(set, 2);
-  fitter.fit_base(base);
+  auto&& [set, fitter, base] = BaseFit(scene);
   // At first it looks like a lag.
   FitState late = base;
   ASSERT_GT(fitter.fit_command_lag(late), 0);
@@ -76,10 +71,8 @@ TEST(CommandLag, GoesWithATermThatExplainsIt) {
 }
 
 /// The first hypothesis of a name, fitted to a set and then separated; nothing if it is no product.
-std::optional<identify::Term> product_of(const MeasuredSet& set, const std::string& name) {
-  FitState state(set);
-  const Fitter fitter(set, 2);
-  fitter.fit_base(state);
+std::optional<identify::Term> product_of(const truth::Scene& scene, const std::string& name) {
+  auto&& [set, fitter, state] = BaseFit(scene);
   std::vector<identify::Dictionary> all = identify::general_dictionaries_of(identify::extent_of(state.tracks));
   all.push_back(identify::dictionary_of(identify::extent_of(state.tracks)));
   for (const identify::Dictionary& dictionary : all) {
@@ -98,8 +91,7 @@ std::optional<identify::Term> product_of(const MeasuredSet& set, const std::stri
 TEST(Products, OfCommandsGetTheirStep) {
   // Turns are slow from the 21st command on.
   const truth::Scene scene = small({truth::many_commands()});
-  const std::optional<identify::Term> term =
-      product_of(set_of(scene, played(scene)), "speed-by-command-and-command-count");
+  const std::optional<identify::Term> term = product_of(scene, "speed-by-command-and-command-count");
   ASSERT_TRUE(term);
   const std::vector<identify::Factor> functions = identify::functions_of(*term);
   const auto step = std::find_if(functions.begin(), functions.end(), [](const identify::Factor& f) {
@@ -122,7 +114,7 @@ TEST(Products, OfDriftsHaveADirection) {
     push.drift_mm_s.y += drift_mm_s * std::sin(M_PI / 6);
   };
   const truth::Scene scene = small({slope});
-  const std::optional<identify::Term> term = product_of(set_of(scene, played(scene)), "drift-by-position-and-time");
+  const std::optional<identify::Term> term = product_of(scene, "drift-by-position-and-time");
   ASSERT_TRUE(term);
   const auto drift_at = [&](double x_mm, double time_s) {
     identify::Situation s;
@@ -145,12 +137,56 @@ TEST(Products, OfDriftsHaveADirection) {
   EXPECT_LT(early.norm(), 1);
 }
 
+/// A drift of 4 mm/s, less or none in some situations.
+truth::Effect drift(std::function<double(const truth::Situation&)> share) {
+  truth::Effect effect;
+  effect.name = "drift";
+  effect.push = [share = std::move(share)](const truth::Situation& at, truth::Push& push) {
+    if (at.driven()) push.drift_mm_s.y += 4 * share(at);
+  };
+  return effect;
+}
+
+TEST(Drifts, AreFoundByWhatTheyDependOn) {
+  const std::map<std::string, truth::Effect> drifts = {
+      {"drift-by-command",
+       drift([](const truth::Situation& at) { return at.motion == truth::Motion::kLeft ? 1 : 0; })},
+      {"drift-by-time-since-command",
+       drift([](const truth::Situation& at) { return 1 - std::exp(-at.since_change_s / 3); })},
+      {"drift-by-robot", drift([](const truth::Situation& at) { return at.robot % 3 == 0 ? 1 : 0; })},
+  };
+  for (const auto& [name, effect] : drifts) {
+    auto&& [set, fitter, base] = BaseFit(small({effect}));
+    const identify::Search found = identify::search(fitter, base, identify::WorkLog({}));
+    ASSERT_EQ(found.fit.model.terms.size(), 1U) << name;
+    EXPECT_EQ(found.fit.model.terms.front().name, name);
+    EXPECT_EQ(found.reasons.front().covariates.front(), "world_frame");
+  }
+}
+
+TEST(MovingCircles, StandIfTheyHardlyMove) {
+  // Some robots are slow in the middle: a circle that moves a little explains more of it than one that stands.
+  truth::Effect patch;
+  patch.name = "patch of some";
+  patch.push = [](const truth::Situation& at, truth::Push& push) {
+    if (at.robot % 2 != 0) return;
+    const double distance_mm = std::hypot(at.disc.x - 40, at.disc.y - 30);
+    const double gain = 1 - 0.5 / (1 + std::pow(distance_mm / 180, 6));
+    push.gain.left *= gain;
+    push.gain.right *= gain;
+  };
+  auto&& [set, fitter, base] = BaseFit(small({patch}));
+  const identify::Search found =
+      identify::search(fitter, base, identify::WorkLog({}), [](const FitState&) { return true; });
+  for (auto& r : found.rejected) printf("%s %g %g\n", r.name.c_str(), r.log10_p, r.threshold_log10_p);
+  ASSERT_FALSE(found.fit.model.terms.empty());
+  for (const identify::Term& term : found.fit.model.terms)
+    EXPECT_EQ(term.name.find("time"), std::string::npos) << term.name;
+}
+
 TEST(TravellingWaves, AreFoundByTheirPeriodogram) {
   const truth::Scene scene = small({truth::travelling_waves()});
-  const MeasuredSet set = set_of(scene, played(scene));
-  FitState base(set);
-  const Fitter fitter(set, 2);
-  fitter.fit_base(base);
+  auto&& [set, fitter, base] = BaseFit(scene);
   const identify::Dictionary waves = identify::wave_dictionary_of(fitter, base, identify::extent_of(base.tracks));
   ASSERT_FALSE(waves.blocks.empty());
   const std::vector<double>& numbers = waves.blocks.front().basis.factors.front().points;
@@ -162,10 +198,7 @@ TEST(TravellingWaves, AreFoundByTheirPeriodogram) {
 
 TEST(TravellingWaves, GetTheirNumbersByLikelihood) {
   const truth::Scene scene = small({truth::travelling_waves()});
-  const MeasuredSet set = set_of(scene, played(scene));
-  FitState state(set);
-  const Fitter fitter(set, 2);
-  fitter.fit_base(state);
+  auto&& [set, fitter, state] = BaseFit(scene);
   const identify::Dictionary waves = identify::wave_dictionary_of(fitter, state, identify::extent_of(state.tracks));
   ASSERT_FALSE(waves.hypotheses.empty());
   identify::Term wave = waves.term_of(waves.hypotheses.front(), 1);
@@ -188,10 +221,7 @@ struct Switch {
 /// Curves of each robot over time, fitted to a scene, after their simplification: by robot.
 std::map<int, Switch> switches_of(const truth::Effect& effect) {
   const truth::Scene scene = small({effect});
-  const MeasuredSet set = set_of(scene, played(scene));
-  FitState state(set);
-  const Fitter fitter(set, 2);
-  fitter.fit_base(state);
+  auto&& [set, fitter, state] = BaseFit(scene);
   const identify::Dictionary dictionary = identify::dictionary_of(identify::extent_of(state.tracks));
   const auto curves =
       std::find_if(dictionary.hypotheses.begin(), dictionary.hypotheses.end(),
@@ -241,10 +271,7 @@ TEST(Uncertainty, HoldsTheTrueBiases) {
   truth::Scene scene = small({});
   scene.robots = 20;
   const truth::Play play = played(scene);
-  const MeasuredSet set = set_of(scene, play);
-  FitState state(set);
-  const Fitter fitter(set, 2);
-  fitter.fit_base(state);
+  auto&& [set, fitter, state] = BaseFit(set_of(scene, play));
   const identify::Uncertainty u = identify::uncertainty_of(fitter, state);
   int outside = 0;
   for (const auto& [robot, covariance] : u.biases) {
@@ -266,10 +293,7 @@ TEST(TrafficGrid, Forgets) {
 
 TEST(PersistentResiduals, AreNoNoise) {
   const auto share = [](const truth::Scene& scene) {
-    const MeasuredSet set = set_of(scene, played(scene));
-    FitState base(set);
-    const Fitter fitter(set, 2);
-    fitter.fit_base(base);
+    auto&& [set, fitter, base] = BaseFit(scene);
     return identify::persistent_share(fitter, base);
   };
   EXPECT_LT(share(small({})), 0.1);
@@ -308,8 +332,7 @@ TEST(Walls, TheLastOneFollowsWithoutHeadings) {
   for (identify::Run& run : set.runs)
     for (identify::Track& track : run.tracks)
       std::erase_if(track.samples, [&](const identify::Sample& s) { return s.y_mm < -wall_mm + 25; });
-  FitState base(set);
-  Fitter(set, 2).fit_base(base);
+  auto&& [part, fitter, base] = BaseFit(std::move(set));
   EXPECT_NEAR(base.model.walls.y_high_mm, wall_mm, 2);
   EXPECT_NEAR(base.model.walls.y_low_mm, -wall_mm, 2);
 }

@@ -21,20 +21,10 @@ namespace {
 using namespace identify;
 
 /// A base model fitted to a scene, and its samples of the noise.
-struct Fitted {
-  explicit Fitted(const truth::Scene& scene)
-      : set(set_of(scene, played(scene))), fitter(set, 2), state(set), samples(samples_of()) {}
+struct Fitted : BaseFit {
+  explicit Fitted(const truth::Scene& scene) : BaseFit(scene), samples(noise_samples_of(state, 2)) {}
 
-  MeasuredSet set;
-  Fitter fitter;
-  FitState state;
   std::vector<NoiseSample> samples;
-
- private:
-  std::vector<NoiseSample> samples_of() {
-    fitter.fit_base(state);
-    return noise_samples_of(state, 2);
-  }
 };
 
 const proto::Effect* record(const proto::Model& model, const std::string& name) {
@@ -125,10 +115,7 @@ TEST(NoiseEffects, EqualNoiseHasNone) {
   for (const std::uint64_t seed : {5u, 6u, 7u, 8u}) {
     truth::Scene scene = small({});
     if (seed > 6) scene.width_mm = scene.height_mm = 450;  // crowded
-    const MeasuredSet set = set_of(scene, played(scene, seed));
-    const Fitter fitter(set, 2);
-    FitState state(set);
-    fitter.fit_base(state);
+    auto&& [set, fitter, state] = BaseFit(scene, seed);
     const std::vector<NoiseSample> samples = noise_samples_of(state, 2);
     ASSERT_GT(samples.size(), 400U) << "fewer are not searched";
     for (const NoiseEffect& effect : find_noise_effects(samples))
@@ -182,10 +169,7 @@ TEST(NoiseInterval, OfTheFactorHoldsTheTruthWhereOtherNoiseMayBeNone) {
   int held = 0;
   double sum_s = 0;
   for (std::uint64_t seed = 1; seed <= kSets; ++seed) {
-    const MeasuredSet set = set_of(scene, played(scene, seed));
-    const Fitter fitter(set, 2);
-    FitState state(set);
-    fitter.fit_base(state);
+    auto&& [set, fitter, state] = BaseFit(scene, seed);
     const NoiseInterval interval = fitter.noise_interval(state);
     held += interval.low.factor_s <= truth_s && truth_s <= interval.high.factor_s ? 1 : 0;
     sum_s += interval.most_likely.factor_s;

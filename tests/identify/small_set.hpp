@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "clients/identify/data/measured_set.hpp"
+#include "clients/identify/fit/fitter.hpp"
 #include "tests/identify/truth/files.hpp"
 #include "tests/identify/truth/play.hpp"
 #include "tests/identify/truth/scenarios.hpp"
@@ -39,5 +40,20 @@ inline identify::MeasuredSet set_of(const truth::Scene& scene, const truth::Play
   std::filesystem::remove_all(folder);
   return set;
 }
+
+/// A set and its base model, fitted.
+struct BaseFit {
+  explicit BaseFit(identify::MeasuredSet data) : set(std::move(data)), fitter(set, 2), state(set) {
+    fitter.fit_base(state);
+  }
+  explicit BaseFit(const truth::Scene& scene, std::uint64_t seed = 5)
+      : BaseFit(set_of(scene, played(scene, seed))) {}
+  BaseFit(const BaseFit&) = delete;
+  BaseFit& operator=(const BaseFit&) = delete;
+
+  const identify::MeasuredSet set;
+  const identify::Fitter fitter;
+  identify::FitState state;
+};
 
 }  // namespace kilotwin

@@ -34,10 +34,7 @@ identify::Search found_in_a_crowd(const truth::Effect& effect) {
   truth::Scene scene = small({effect});
   scene.robots = 12;
   scene.width_mm = scene.height_mm = 360;
-  const MeasuredSet set = set_of(scene, played(scene));
-  FitState base(set);
-  const Fitter fitter(set, 2);
-  fitter.fit_base(base);
+  auto&& [set, fitter, base] = BaseFit(scene);
   return identify::search(fitter, base, identify::WorkLog({}));
 }
 
@@ -75,10 +72,7 @@ Term term_of(const std::vector<Dictionary>& all, const std::string& name, Target
 
 TEST(WheelOffsets, OfRobotsThatAreReplaced) {
   const truth::Scene scene = small({truth::replaced_robots()});
-  const MeasuredSet set = set_of(scene, played(scene));
-  FitState state(set);
-  const Fitter fitter(set, 2);
-  fitter.fit_base(state);
+  auto&& [set, fitter, state] = BaseFit(scene);
   Term curves = term_of(identify::general_dictionaries_of(identify::extent_of(state.tracks)),
                         "turning-by-robot-and-time", Target::kTurn);
   ASSERT_FALSE(curves.blocks.empty());
@@ -122,10 +116,7 @@ Factor known(Factor::Shape shape, identify::Covariate of, double low, double hig
 
 TEST(Products, OfRobotsTimeAndPosition) {
   const truth::Scene scene = small({truth::late_patch_of_some()});
-  const MeasuredSet set = set_of(scene, played(scene));
-  FitState state(set);
-  const Fitter fitter(set, 2);
-  fitter.fit_base(state);
+  auto&& [set, fitter, state] = BaseFit(scene);
   const double without = fitter.log_likelihood(state);
   // As from a step with amplitudes per robot, which is found first: a rough instant, and a speed that falls to the right.
   Factor robots = known(Factor::Shape::kTable, identify::Covariate::kRobot, 0, 1, {});

@@ -69,16 +69,11 @@ TEST(Stalls, DurationsAreFittedWithCensoring) {
 }
 
 /// A base model fitted to a scene, and the stalls that are found beside it.
-struct WithStalls {
-  explicit WithStalls(const truth::Scene& scene, std::uint64_t seed = 5)
-      : set(set_of(scene, played(scene, seed))), fitter(set, 2), state(set) {
-    fitter.fit_base(state);
+struct WithStalls : BaseFit {
+  explicit WithStalls(const truth::Scene& scene, std::uint64_t seed = 5) : BaseFit(scene, seed) {
     base = state.model;
     found = find_stalls(fitter, state);
   }
-  MeasuredSet set;
-  Fitter fitter;
-  FitState state;
   MotionModel base;
   std::optional<StallEffect> found;
 };
@@ -132,10 +127,7 @@ TEST(Stalls, AreNotFoundInNoise) {
 
 TEST(Stalls, AreNoMatterOfObstacles) {
   const truth::Scene scene = small({});
-  const MeasuredSet set = set_of(scene, played(scene));
-  FitState state(set);
-  const Fitter fitter(set, 2);
-  fitter.fit_base(state);
+  auto&& [set, fitter, state] = BaseFit(scene);
   const SpellScan scan(state, 2);
   // Shares in spells: of every third interval, or of those close to another robot.
   const auto found = [&](bool close) {

@@ -147,9 +147,10 @@ void add_pairs_of_drifts(DictionaryBuilder& make, const Extent& extent) {
     for (std::size_t i = 0; i < parts.size(); ++i)
       for (std::size_t j = i + 1; j < parts.size(); ++j)
         if (group == &kSlip || !(i == 0 && j == 1)) add_pair(make, *group, parts[i], parts[j]);
-    if (extent.robots.size() < 2) continue;
-    for (const Part& part : parts) add_pair(make, *group, robot_part(extent), part);
   }
+  if (extent.robots.size() < 2) return;
+  add_pair(make, kSlip, robot_part(extent), time_part(extent, 2));
+  if (commands) add_pair(make, kSlip, robot_part(extent), command_part(extent));
 }
 
 void add_pairs_with_neighbours(DictionaryBuilder& make, const Extent& extent) {

@@ -67,6 +67,8 @@ bool looks_at_runs(const Term& term) {
 }
 
 constexpr Eigen::Index kFlips = 400;
+/// The fewest degrees of freedom of a statistic that a few clusters dominate.
+constexpr double kFewestDegrees = 0.5;
 
 /// Random signs, one row per cluster and one column per flip.
 Eigen::MatrixXd signs(Eigen::Index clusters, std::uint64_t seed) {
@@ -326,9 +328,15 @@ Finding ScoreTest::finding_of(std::size_t h, const ReducedDictionary& reduced, c
     const double within = robots ? within_units(scores, cluster_unit_) : within_groups(scores, cluster_run_);
     if (within > 0) own_dispersion = std::clamp(within / degrees, 1.0, dispersion);
   }
-  finding.log10_p = stats::log10_chi_squared_tail(finding.statistic / own_dispersion, degrees);
-  for (Eigen::Index f = 0; f < kFlips; ++f)
-    flips_log10_p(f) = stats::log10_chi_squared_tail(statistics[f] / dispersion, degrees);
+  // A few clusters can hold most of the scores. The statistic then has the tail of fewer degrees of freedom (Satterthwaite).
+  const double variance = (statistics.array() / dispersion - statistics.mean() / dispersion).square().mean();
+  const double fewer =
+      std::clamp(2 * degrees * degrees / std::max(variance, 1e-9), std::min(kFewestDegrees, degrees), degrees);
+  const auto log10_p_of = [&](double statistic) {
+    return stats::log10_chi_squared_tail(statistic * fewer / degrees, fewer);
+  };
+  finding.log10_p = log10_p_of(finding.statistic / own_dispersion);
+  for (Eigen::Index f = 0; f < kFlips; ++f) flips_log10_p(f) = log10_p_of(statistics[f] / dispersion);
   return finding;
 }
 
