@@ -87,13 +87,12 @@ bool SearchLoop::accepted(const Finding& best, const ScoreTest::Outcome& outcome
   const Search before = out_;
   const std::string name = hypothesis(best).name;
   say(kAddition, "fitting " + name);
-  const double likelihood = fitter_.log_likelihood_of_all(out_.fit);
+  const Likelihoods likelihoods = likelihoods_now();
   note_ambiguous(best, outcome);
   if (replaced_by_alternative(name)) return true;
   note_alternatives(best, outcome);
   add(best, threshold_log10_p);
-  // Negated, so that a likelihood that is no number fails.
-  if (!(fitter_.log_likelihood_of_all(out_.fit) >= likelihood + kLeastRise)) {
+  if (!rose_from(likelihoods)) {
     out_ = before;
     failed_.insert({Attempt::Kind::kNamed, {name}});
     return false;
@@ -105,6 +104,15 @@ bool SearchLoop::accepted(const Finding& best, const ScoreTest::Outcome& outcome
   try_camera_motion();
   refit_lag();
   return true;
+}
+
+SearchLoop::Likelihoods SearchLoop::likelihoods_now() const {
+  return {fitter_.log_likelihood(out_.fit), fitter_.log_likelihood_of_all(out_.fit)};
+}
+
+bool SearchLoop::rose_from(const Likelihoods& before) const {
+  const Likelihoods now = likelihoods_now();
+  return now.away >= before.away + kLeastRise || now.of_all >= before.of_all + kLeastRise;
 }
 
 void SearchLoop::refit_lag() {

@@ -71,14 +71,14 @@ std::vector<SearchLoop::GeneralTerm> SearchLoop::general_candidates(bool screeni
 
 bool SearchLoop::fits(GeneralTerm one, const Attempt& attempt) {
   const Search before = out_;
-  const double likelihood = fitter_.log_likelihood_of_all(out_.fit);
+  const Likelihoods likelihoods = likelihoods_now();
   out_.steps.push_back({one.term.name, one.reason.finding.held_out});
   out_.fit.model.terms.push_back(std::move(one.term));
   out_.reasons.push_back(std::move(one.reason));
   fitter_.fit(out_.fit, 2);
   refine_shape(out_.fit.model.terms.size() - 1);
   fitter_.fit_contacts(out_.fit);
-  if (fitter_.log_likelihood_of_all(out_.fit) >= likelihood + kLeastRise) return true;
+  if (rose_from(likelihoods)) return true;
   out_ = before;
   failed_.insert(attempt);
   return false;

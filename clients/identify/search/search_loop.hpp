@@ -92,6 +92,14 @@ class SearchLoop {
   /// Whether the last term, amplitudes of an accepted curve, was merged with it.
   bool merged();
   [[nodiscard]] bool worked_out() const;
+  /// Log likelihood away from walls and other robots, and of all.
+  struct Likelihoods {
+    double away, of_all;
+  };
+  [[nodiscard]] Likelihoods likelihoods_now() const;
+  /// Whether one of them rose. A refit of contacts lowers that of all: their noise covers pushes that persist, which is more than the
+  /// likelihood of single steps asks for. It also decides which rows are away.
+  [[nodiscard]] bool rose_from(const Likelihoods& before) const;
   void note_stage() { out_.path.push_back({out_.fit, out_.reasons}); }
   /// Gain in log likelihood of all accepted effects.
   [[nodiscard]] double explained() const { return fitter_.log_likelihood_of_all(out_.fit) - base_likelihood_; }

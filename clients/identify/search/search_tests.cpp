@@ -64,7 +64,7 @@ bool SearchLoop::good(const Finding& f, double threshold) {
 }
 
 bool SearchLoop::clear(const Finding& f, double threshold) {
-  constexpr double kClearEvidence = 15, kClearLog10P = 2, kClearHeldOut = 8;
+  constexpr double kClearEvidence = 5, kClearLog10P = 2, kClearHeldOut = 3;
   return f.log10_p < threshold - kClearLog10P && f.evidence > kClearEvidence && f.held_out > kClearHeldOut;
 }
 
