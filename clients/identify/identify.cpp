@@ -162,7 +162,7 @@ Search found_by_search(const Fitter& fitter, const FitState& base, const Measure
   found = search(fitter, base, log, leaves_much);
   log.begin(kTermChecks, "search", "checking each effect", found.fit.model.terms.size());
   keep_predictive_terms(fitter, train, times, found);
-  replace_maps_by_circles(fitter, found);
+  fit_circles(fitter, found);
   return found;
 }
 

@@ -30,7 +30,7 @@ std::vector<Stage> path_to(const Search& found) {
                [&](const Stage& stage) { return stage.fit.model.terms.size() < terms; });
   if (terms == 0) path.push_back(found.path.front());
   if (terms == 0 && found.fit.model.base.command_lag_s == path.front().fit.model.base.command_lag_s) return path;
-  if (found.with_maps) path.push_back(*found.with_maps);
+  if (found.with_curves) path.push_back(*found.with_curves);
   path.push_back({found.fit, found.reasons});
   return path;
 }

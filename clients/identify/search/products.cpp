@@ -1,5 +1,6 @@
 #include "clients/identify/search/products.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>

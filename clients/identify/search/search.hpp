@@ -58,8 +58,8 @@ struct Search {
   std::vector<Step> steps;
   std::string limit;  ///< one sentence if the search ended at one of its limits; empty: nothing passed any more
   std::uint64_t work = 0;  ///< PreparedSet::work at its end
-  /// With maps of the position where the model has circles; the last check chooses. Nothing: no map was replaced.
-  std::optional<Stage> with_maps = {};
+  /// With maps and curves where the model has circles and edges; the last check chooses. Nothing: none was replaced.
+  std::optional<Stage> with_curves = {};
 };
 
 /// Limit of a search: accepted changes without general terms. Each of these allows two more.

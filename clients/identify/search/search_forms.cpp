@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 #include <utility>
 
+#include "clients/identify/search/change_points.hpp"
 #include "clients/identify/search/moving_circles.hpp"
 #include "clients/identify/search/search_loop.hpp"
 #include "clients/identify/search/travelling_waves.hpp"
@@ -17,6 +17,10 @@ constexpr std::size_t kMostTries = 4;
 /// Largest number of samples in the test of general terms, which have many columns; and where the error that is left looks like
 /// noise: enough for a clear effect.
 constexpr std::size_t kEnoughForGeneral = 70000, kEnoughForScreening = 25000;
+
+bool is_of_place(const Axis& axis) {
+  return axis.of == Covariate::kX || axis.of == Covariate::kY || axis.of == Covariate::kPointDistance;
+}
 
 }  // namespace
 
@@ -105,17 +109,26 @@ bool SearchLoop::accept_wave(double evidence) {
 }
 
 bool SearchLoop::may_be_part_of_circle(std::size_t t) const {
-  const Reason& reason = out_.reasons[t];
-  return reason.acts_on == kSpeed.in_words && !is_moving_circle(out_.fit.model.terms[t]) &&
-         std::all_of(reason.covariates.begin(), reason.covariates.end(),
-                     [](const std::string& of) { return of == "position" || of == "time"; });
+  const Term& term = out_.fit.model.terms[t];
+  if (out_.reasons[t].acts_on != kSpeed.in_words || is_moving_circle(term)) return false;
+  return std::all_of(term.blocks.begin(), term.blocks.end(), [](const Block& block) {
+    return std::all_of(block.basis.factors.begin(), block.basis.factors.end(),
+                       [](const Factor& f) { return is_of_place(f.axis) || only_rises(f.axis); });
+  });
 }
 
 bool SearchLoop::has_parts_of_circle() const {
-  std::set<std::string> of;
-  for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t)
-    if (may_be_part_of_circle(t)) of.insert(out_.reasons[t].covariates.begin(), out_.reasons[t].covariates.end());
-  return of.size() == 2;
+  bool place = false, rises = false;
+  for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t) {
+    if (!may_be_part_of_circle(t)) continue;
+    for (const Block& block : out_.fit.model.terms[t].blocks) {
+      for (const Factor& f : block.basis.factors) {
+        place = place || is_of_place(f.axis);
+        rises = rises || only_rises(f.axis);
+      }
+    }
+  }
+  return place && rises;
 }
 
 bool SearchLoop::accept_moving_circle(bool alone) {

@@ -137,12 +137,11 @@ class SearchLoop {
   /// A travelling wave with more evidence than the best hypothesis, which may be a proxy of it: adds the wave. A wave that
   /// repeats neither within a run nor on the floor is left to the other hypotheses: it may be a proxy itself.
   bool accept_wave(double evidence);
-  /// Whether a term is an effect of position or time on the speed, and no moving circle itself.
+  /// Whether a term is an effect on the speed of the position or of what only rises in a run, as time does, and no moving circle itself.
   [[nodiscard]] bool may_be_part_of_circle(std::size_t t) const;
-  /// Whether effects of both position and time were found that a moving circle may replace. Its further proxies would cost many
-  /// rounds.
+  /// Whether effects of both were found that a moving circle may replace. Its further proxies would cost many rounds.
   [[nodiscard]] bool has_parts_of_circle() const;
-  /// Effects of position and of time can be proxies of a circle that moves or grows: tries one in place of all of them. It stays
+  /// Effects of position and of what only rises can be proxies of a circle that moves or grows: tries one in place of all of them. It stays
   /// if the evidence of the whole model is larger. `alone`: and if no hypothesis finds much beside it. Otherwise the effects may grow
   /// into a product that explains more.
   bool accept_moving_circle(bool alone);

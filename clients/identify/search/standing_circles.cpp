@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "clients/identify/search/circle_edges.hpp"
 #include "clients/identify/search/moving_circles.hpp"
 #include "clients/identify/search/number_steps.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
@@ -227,18 +228,6 @@ bool move_centres(const Fitter& fitter, FitState& state, std::size_t place) {
   return move_numbers(fitter, state, steps, likelihood);
 }
 
-/// Fits until the likelihood settles: the base speeds move far when a curve becomes a step.
-void settle(const Fitter& fitter, FitState& state) {
-  constexpr int kMostFits = 6;
-  double before = -1e300;
-  for (int i = 0; i < kMostFits; ++i) {
-    fitter.fit(state, 2);
-    const double now = fitter.log_likelihood(state);
-    if (!(now > before + 1)) return;
-    before = now;
-  }
-}
-
 /// Adds a curve about the centre of a disc to a term, and moves all centres to where they are most likely.
 void add_curve(const Fitter& fitter, FitState& state, std::size_t place, Target target, const Disc& disc) {
   constexpr std::uint32_t kColumns = 16;
@@ -256,51 +245,19 @@ void add_curve(const Fitter& fitter, FitState& state, std::size_t place, Target 
   }
 }
 
-/// Moves numbers of the circles by steps as long as the likelihood rises. `first_mm`: the first step, which is halved down to 0.7 mm.
-/// Ends early at `most_work`.
-void climb(const Fitter& fitter, FitState& state, std::size_t place, double first_mm,
-           const std::vector<double& (*)(Factor&)>& numbers, std::uint64_t most_work) {
-  constexpr double kLast_mm = 0.7;
-  double likelihood = fitter.log_likelihood(state);
-  const auto moved = [&](std::size_t b, double& (*number)(Factor&), double by_mm) {
-    FitState trial = state;
-    number(curve_of(trial.model.terms[place].blocks[b])) += by_mm;
-    fitter.fit(trial, 2);
-    const double found = fitter.log_likelihood(trial);
-    // Negated, so that a likelihood that is no number is no progress.
-    if (!(found > likelihood)) return false;
-    likelihood = found;
-    state = std::move(trial);
-    return true;
-  };
-  const std::size_t circles = state.model.terms[place].blocks.size();
-  for (double step_mm = first_mm; step_mm > kLast_mm; step_mm /= 2)
-    for (std::size_t b = 0; b < circles; ++b)
-      for (const auto number : numbers)
-        if (state.tracks.work() < most_work && !moved(b, number, step_mm)) moved(b, number, -step_mm);
-}
-
 /// The term with one step per circle in place of its curves. The radii begin at these.
 FitState with_edges(const Fitter& fitter, FitState state, std::size_t place, const std::vector<double>& radii_mm,
                     std::uint64_t most_work) {
-  Term& term = state.model.terms[place];
-  const auto circles = static_cast<Eigen::Index>(term.blocks.size());
-  for (Eigen::Index b = 0; b < circles; ++b) {
-    Block& block = term.blocks[static_cast<std::size_t>(b)];
-    // The columns that are left of the curve.
-    block.basis.chosen.clear();
-    Factor& edge = curve_of(block);
-    edge.shape = Shape::kAtLeast;
-    edge.points = {radii_mm[static_cast<std::size_t>(b)]};
+  put_edges(fitter, state, place, radii_mm);
+  std::vector<MoveNumber> radii, all;
+  for (std::size_t b = 0; b < radii_mm.size(); ++b) {
+    all.push_back([b](Term& term, double by_mm) { curve_of(term.blocks[b]).axis.point.x_mm += by_mm; });
+    all.push_back([b](Term& term, double by_mm) { curve_of(term.blocks[b]).axis.point.y_mm += by_mm; });
+    radii.push_back([b](Term& term, double by_mm) { curve_of(term.blocks[b]).points.front() += by_mm; });
+    all.push_back(radii.back());
   }
-  term.coefficients = Eigen::VectorXd::Zero(circles);
-  term.precision = Eigen::VectorXd::Constant(circles, 1 / (kPriorSd * kPriorSd));
-  settle(fitter, state);
-  const auto radius = [](Factor& edge) -> double& { return edge.points.front(); };
-  const auto x = [](Factor& edge) -> double& { return edge.axis.point.x_mm; };
-  const auto y = [](Factor& edge) -> double& { return edge.axis.point.y_mm; };
-  climb(fitter, state, place, 12, {radius}, most_work);
-  climb(fitter, state, place, 2, {x, y, radius}, most_work);
+  climb(fitter, state, place, 12, radii, most_work);
+  climb(fitter, state, place, 2, all, most_work);
   refit(fitter, state, place);
   return state;
 }
@@ -364,7 +321,7 @@ bool replace_by_circles(const Fitter& fitter, FitState& state, std::size_t place
 
 }  // namespace
 
-void replace_maps_by_circles(const Fitter& fitter, Search& found) {
+void fit_circles(const Fitter& fitter, Search& found) {
   Stage before{found.fit, found.reasons};
   const auto searched = static_cast<double>(found.fit.tracks.work());
   const auto most_work =
@@ -372,7 +329,8 @@ void replace_maps_by_circles(const Fitter& fitter, Search& found) {
   bool replaced = false;
   for (std::size_t t = 0; t < found.fit.model.terms.size(); ++t)
     replaced = replace_by_circles(fitter, found.fit, t, most_work) || replaced;
-  if (replaced) found.with_maps = std::move(before);
+  replaced = sharpen_moving_circles(fitter, found, most_work) || replaced;
+  if (replaced) found.with_curves = std::move(before);
 }
 
 }  // namespace kilotwin::identify

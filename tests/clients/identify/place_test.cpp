@@ -191,9 +191,9 @@ TEST(Place, PatchesOfTheFloorBecomeCircles) {
       played([&](const Around& a) { return gain(a.x_mm[a.robot], a.y_mm[a.robot]); }, 5, 12, 200);
   const Fitter fitter(set, 2);
   Search found = search_with_map(fitter, set, 5);
-  replace_maps_by_circles(fitter, found);
-  ASSERT_TRUE(found.with_maps);
-  EXPECT_NE(found.with_maps->fit.model.terms[0].blocks.front().basis.factors.front().axis.of,
+  fit_circles(fitter, found);
+  ASSERT_TRUE(found.with_curves);
+  EXPECT_NE(found.with_curves->fit.model.terms[0].blocks.front().basis.factors.front().axis.of,
             Covariate::kPointDistance);
   const std::vector<Block>& blocks = found.fit.model.terms[0].blocks;
   ASSERT_EQ(blocks.size(), 2U);
@@ -215,8 +215,8 @@ TEST(Place, ASlopeOfTheFloorIsNoCircle) {
   const Fitter fitter(set, 2);
   Search found = search_with_map(fitter, set, 3);
   const std::string before = proto_of(found.fit.model).SerializeAsString();
-  replace_maps_by_circles(fitter, found);
-  EXPECT_FALSE(found.with_maps);
+  fit_circles(fitter, found);
+  EXPECT_FALSE(found.with_curves);
   EXPECT_EQ(proto_of(found.fit.model).SerializeAsString(), before);
 }
 
