@@ -306,7 +306,7 @@ ScoreTest::ReducedDictionary ScoreTest::reduced_dictionary() const {
 
 /// Tests one hypothesis. `flips_log10_p` becomes its log10 p value under each flip; it stays if no column has information.
 Finding ScoreTest::finding_of(std::size_t h, const ReducedDictionary& reduced, const Eigen::MatrixXd& flipped,
-                              Eigen::VectorXd& flips_log10_p) const {
+                              Tail tail, Eigen::VectorXd& flips_log10_p) const {
   const Hypothesis& hypothesis = dictionary_.hypotheses[h];
   const std::vector<Eigen::Index>& columns = hypothesis.columns;
   Finding finding;
@@ -328,19 +328,21 @@ Finding ScoreTest::finding_of(std::size_t h, const ReducedDictionary& reduced, c
     const double within = robots ? within_units(scores, cluster_unit_) : within_groups(scores, cluster_run_);
     if (within > 0) own_dispersion = std::clamp(within / degrees, 1.0, dispersion);
   }
-  // A few clusters can hold most of the scores. The statistic then has the tail of fewer degrees of freedom (Satterthwaite).
-  const double variance = (statistics.array() / dispersion - statistics.mean() / dispersion).square().mean();
-  const double fewer =
-      std::clamp(2 * degrees * degrees / std::max(variance, 1e-9), std::min(kFewestDegrees, degrees), degrees);
+  double freedom = degrees;
+  if (tail == Tail::kOfClusters) {
+    const double variance = (statistics.array() - statistics.mean()).square().mean() / (dispersion * dispersion);
+    freedom =
+        std::clamp(2 * degrees * degrees / std::max(variance, 1e-9), std::min(kFewestDegrees, degrees), degrees);
+  }
   const auto log10_p_of = [&](double statistic) {
-    return stats::log10_chi_squared_tail(statistic * fewer / degrees, fewer);
+    return stats::log10_chi_squared_tail(statistic * freedom / degrees, freedom);
   };
   finding.log10_p = log10_p_of(finding.statistic / own_dispersion);
   for (Eigen::Index f = 0; f < kFlips; ++f) flips_log10_p(f) = log10_p_of(statistics[f] / dispersion);
   return finding;
 }
 
-ScoreTest::Outcome ScoreTest::test(std::uint64_t seed) const {
+ScoreTest::Outcome ScoreTest::test(std::uint64_t seed, Tail tail) const {
   const ReducedDictionary reduced = reduced_dictionary();
   const Eigen::MatrixXd flips = signs(reduced.clusters.cols(), seed);
   Eigen::MatrixXd flipped(reduced.clusters.rows(), kFlips);
@@ -351,10 +353,9 @@ ScoreTest::Outcome ScoreTest::test(std::uint64_t seed) const {
   out.findings.resize(dictionary_.hypotheses.size());
   std::vector<Eigen::VectorXd> log10_p(out.findings.size(), Eigen::VectorXd::Zero(kFlips));
   os::in_parallel(out.findings.size(), threads_,
-                  [&](std::size_t h) { out.findings[h] = finding_of(h, reduced, flipped, log10_p[h]); });
+                  [&](std::size_t h) { out.findings[h] = finding_of(h, reduced, flipped, tail, log10_p[h]); });
   Eigen::VectorXd worst = Eigen::VectorXd::Zero(kFlips);
-  for (const Eigen::VectorXd& one : log10_p)
-    for (Eigen::Index f = 0; f < kFlips; ++f) worst(f) = std::min(worst(f), one(f));
+  for (const Eigen::VectorXd& one : log10_p) worst = worst.cwiseMin(one);
   // The minimum over many p values follows a Gumbel distribution on the log scale.
   const double mean = worst.mean();
   const double sd = std::sqrt((worst.array() - mean).square().mean());

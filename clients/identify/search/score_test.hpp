@@ -24,6 +24,15 @@ struct Finding {
   double held_out = 0;        ///< cross-validated gain in log likelihood
 };
 
+/// The distribution of the statistic without an effect.
+enum class Tail : std::uint8_t {
+  kOfColumns,  ///< chi-squared with one degree of freedom per column; has power for effects that only few clusters show
+  /// Chi-squared with the degrees of freedom that the flips show, fewer where a few clusters hold most of the scores (Satterthwaite).
+  /// Has power beside large effects that the model lacks: by the other tail, some hypothesis has tiny p under many flips then, and the
+  /// threshold of all becomes very strict.
+  kOfClusters
+};
+
 /// The entries of the information that a ScoreTest reads.
 [[nodiscard]] ColumnGroups columns_read_by_test(const MotionModel&, const Dictionary&);
 
@@ -40,7 +49,7 @@ class ScoreTest {
         0;  ///< under the null hypothesis the smallest log10 p falls below it with probability kFamilyAlarm
   };
   /// Tests the dictionary in addition to all terms of the model.
-  [[nodiscard]] Outcome test(std::uint64_t seed) const;
+  [[nodiscard]] Outcome test(std::uint64_t seed, Tail) const;
   /// Evidence and cross-validated gain of a hypothesis if one term of the model is removed; below 0: none is
   /// removed.
   [[nodiscard]] Finding evidence_of(const Hypothesis&, int without_term) const;
@@ -61,7 +70,7 @@ class ScoreTest {
   };
   [[nodiscard]] ReducedDictionary reduced_dictionary() const;
   [[nodiscard]] Finding finding_of(std::size_t hypothesis, const ReducedDictionary&, const Eigen::MatrixXd& flipped,
-                                   Eigen::VectorXd& flips_log10_p) const;
+                                   Tail, Eigen::VectorXd& flips_log10_p) const;
   [[nodiscard]] Reduced reduce(const std::vector<Eigen::Index>& columns, int without_term, bool by_cluster) const;
   [[nodiscard]] Finding evidence_of(const Reduced&, const Eigen::VectorXd& scale, double log_choices) const;
 

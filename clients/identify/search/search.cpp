@@ -48,24 +48,32 @@ Search SearchLoop::run() {
 }
 
 bool SearchLoop::changed() {
-  say(kTest, "testing hypotheses");
   if (limit().empty() && accept_calibration_shifts()) return true;
   if (has_parts_of_circle() && accept_moving_circle(true)) return true;
+  if (accept_hypothesis(Tail::kOfColumns)) return true;
+  say(kAlternatives, "testing alternatives");
+  return eliminate() || accept_moving_circle(false) || accept_further_circle() ||
+         accept_general(Tail::kOfColumns) || accept_hypothesis(Tail::kOfClusters) ||
+         accept_general(Tail::kOfClusters);
+}
+
+bool SearchLoop::accept_hypothesis(Tail tail) {
+  if (tail == Tail::kOfClusters && !limit().empty()) return false;
+  say(kTest, "testing hypotheses");
   score_dictionary();
-  const ScoreTest::Outcome outcome = score_test_->test(kSeed + static_cast<std::uint64_t>(round_));
-  note_rejected(outcome);
+  const ScoreTest::Outcome outcome = score_test_->test(kSeed + static_cast<std::uint64_t>(round_), tail);
+  if (tail == Tail::kOfColumns) note_rejected(outcome);
   // A hypothesis that fails leaves the state as it was, so that the outcome of the tests remains valid.
   bool waves_tried = false;
-  while (const Finding* const best = best_of(outcome, kRemnant * explained())) {
+  while (const Finding* const best = best_of(outcome, kRemnant * explained(), tail)) {
     out_.limit = limit();
-    if (!out_.limit.empty()) break;
+    if (!out_.limit.empty()) return false;
     if (lag_explains(*best)) return true;
     if (!std::exchange(waves_tried, true) && accept_wave(best->evidence)) return true;
-    if (accepted(*best, outcome, outcome.threshold_log10_p)) return true;
+    if (accepted(*best, outcome, tail)) return true;
     ++failures_;
   }
-  say(kAlternatives, "testing alternatives");
-  return eliminate() || accept_moving_circle(false) || accept_further_circle() || accept_general();
+  return false;
 }
 
 bool SearchLoop::worked_out() const { return out_.fit.tracks.work() >= kMostWork; }
@@ -83,7 +91,7 @@ std::string SearchLoop::limit() const {
   return {};
 }
 
-bool SearchLoop::accepted(const Finding& best, const ScoreTest::Outcome& outcome, double threshold_log10_p) {
+bool SearchLoop::accepted(const Finding& best, const ScoreTest::Outcome& outcome, Tail tail) {
   const Search before = out_;
   const std::string name = hypothesis(best).name;
   say(kAddition, "fitting " + name);
@@ -91,10 +99,10 @@ bool SearchLoop::accepted(const Finding& best, const ScoreTest::Outcome& outcome
   note_ambiguous(best, outcome);
   if (replaced_by_alternative(name)) return true;
   note_alternatives(best, outcome);
-  add(best, threshold_log10_p);
-  if (!rose_from(likelihoods)) {
+  add(best, outcome.threshold_log10_p);
+  if (!rose_from(likelihoods, tail)) {
     out_ = before;
-    failed_.insert({Attempt::Kind::kNamed, {name}});
+    failed_.insert({Attempt::Kind::kNamed, {name}, tail});
     return false;
   }
   // A finding may have refined an earlier term instead.
@@ -110,9 +118,10 @@ SearchLoop::Likelihoods SearchLoop::likelihoods_now() const {
   return {fitter_.log_likelihood(out_.fit), fitter_.log_likelihood_of_all(out_.fit)};
 }
 
-bool SearchLoop::rose_from(const Likelihoods& before) const {
+bool SearchLoop::rose_from(const Likelihoods& before, Tail tail) const {
   const Likelihoods now = likelihoods_now();
-  return now.away >= before.away + kLeastRise || now.of_all >= before.of_all + kLeastRise;
+  return now.of_all >= before.of_all + kLeastRise ||
+         (tail == Tail::kOfClusters && now.away >= before.away + kLeastRise);
 }
 
 void SearchLoop::refit_lag() {

@@ -25,7 +25,7 @@ bool is_of_place(const Axis& axis) {
 }  // namespace
 
 void SearchLoop::add_candidates(const Dictionary& family, bool general, double least_evidence, Candidates& best,
-                                bool screening) {
+                                Tail tail, bool screening) {
   std::vector<Block> blocks = blocks_of(out_.fit.model);
   blocks.insert(blocks.end(), family.blocks.begin(), family.blocks.end());
   const ColumnGroups read = columns_read_by_test(out_.fit.model, family);
@@ -33,10 +33,10 @@ void SearchLoop::add_candidates(const Dictionary& family, bool general, double l
       linearise(out_.fit.model, tested_units(screening ? kEnoughForScreening : kEnoughForGeneral), blocks,
                 {100, fitter_.threads(), -1, &read});
   const ScoreTest test(fitter_, out_.fit.model, units, family);
-  const ScoreTest::Outcome outcome = test.test(kSeed + 100 + static_cast<std::uint64_t>(round_));
+  const ScoreTest::Outcome outcome = test.test(kSeed + 100 + static_cast<std::uint64_t>(round_), tail);
   for (const Finding& f : outcome.findings) {
     const Hypothesis& h = family.hypotheses[f.hypothesis];
-    const Attempt attempt{general ? Attempt::Kind::kGeneral : Attempt::Kind::kForm, {h.name}};
+    const Attempt attempt{general ? Attempt::Kind::kGeneral : Attempt::Kind::kForm, {h.name}, tail};
     const auto known = best.find(attempt);
     if (!(screening ? clear(f, outcome.threshold_log10_p) : good(f, outcome.threshold_log10_p)) ||
         f.evidence < least_evidence || failed_.contains(attempt) ||
@@ -48,7 +48,7 @@ void SearchLoop::add_candidates(const Dictionary& family, bool general, double l
   }
 }
 
-std::vector<SearchLoop::GeneralTerm> SearchLoop::general_candidates(bool screening) {
+std::vector<SearchLoop::GeneralTerm> SearchLoop::general_candidates(Tail tail, bool screening) {
   if (general_.empty()) general_ = general_dictionaries_of(extent_);
   std::vector<Dictionary> families = general_;
   if (!screening) {
@@ -62,7 +62,7 @@ std::vector<SearchLoop::GeneralTerm> SearchLoop::general_candidates(bool screeni
   for (const Dictionary& family : families) {
     // Waves and moving circles have a form of their own, with a name.
     const bool general = static_cast<std::size_t>(&family - families.data()) < general_.size();
-    add_candidates(family, general, least, best, screening);
+    add_candidates(family, general, least, best, tail, screening);
   }
   std::vector<GeneralTerm> ranked;
   for (auto& [attempt, one] : best) ranked.push_back(std::move(one));
@@ -82,7 +82,10 @@ bool SearchLoop::fits(GeneralTerm one, const Attempt& attempt) {
   fitter_.fit(out_.fit, 2);
   refine_shape(out_.fit.model.terms.size() - 1);
   fitter_.fit_contacts(out_.fit);
-  if (rose_from(likelihoods)) return true;
+  if (rose_from(likelihoods, attempt.tail)) {
+    if (!out_.fit.model.terms.back().general) eliminate_earlier();
+    return true;
+  }
   out_ = before;
   failed_.insert(attempt);
   return false;
@@ -112,8 +115,10 @@ bool SearchLoop::may_be_part_of_circle(std::size_t t) const {
   const Term& term = out_.fit.model.terms[t];
   if (out_.reasons[t].acts_on != kSpeed.in_words || is_moving_circle(term)) return false;
   return std::all_of(term.blocks.begin(), term.blocks.end(), [](const Block& block) {
-    return std::all_of(block.basis.factors.begin(), block.basis.factors.end(),
-                       [](const Factor& f) { return is_of_place(f.axis) || only_rises(f.axis); });
+    const std::vector<Factor>& factors = block.basis.factors;
+    return std::all_of(factors.begin(), factors.end(), [&](const Factor& f) {
+      return is_of_place(f.axis) || only_rises(f.axis) || (f.axis.of == Covariate::kRobot && factors.size() > 1);
+    });
   });
 }
 
@@ -174,12 +179,12 @@ bool SearchLoop::accept_further_circle() {
   return !best.empty() && fits(std::move(best.begin()->second), attempt);
 }
 
-bool SearchLoop::accept_general() {
+bool SearchLoop::accept_general(Tail tail) {
   if (general_terms_ == kMostGeneral || !limit().empty() || !leaves_much_) return false;
   say(kGeneralTerms, "testing general terms");
-  for (GeneralTerm& one : general_candidates(!leaves_much_(out_.fit))) {
+  for (GeneralTerm& one : general_candidates(tail, !leaves_much_(out_.fit))) {
     if (worked_out()) break;
-    const Attempt attempt{one.term.general ? Attempt::Kind::kGeneral : Attempt::Kind::kForm, {one.term.name}};
+    const Attempt attempt{one.term.general ? Attempt::Kind::kGeneral : Attempt::Kind::kForm, {one.term.name}, tail};
     if (!fits(std::move(one), attempt)) continue;
     ++general_terms_;
     --eliminations_;

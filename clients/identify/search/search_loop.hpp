@@ -31,6 +31,7 @@ struct Attempt {
   };
   Kind kind;
   std::vector<std::string> names;
+  Tail tail = Tail::kOfColumns;  ///< by which it passed
   auto operator<=>(const Attempt&) const = default;
 };
 
@@ -72,9 +73,11 @@ class SearchLoop {
   bool changed();
   /// The limit that the search has reached, in one sentence; empty: none. It then adds nothing more.
   [[nodiscard]] std::string limit() const;
-  /// Adds a hypothesis whose p fell below `threshold_log10_p`. Returns false, with the state as before, if the likelihood
+  /// Tests all hypotheses and adds the one with the most evidence that fits. Returns whether there is one.
+  bool accept_hypothesis(Tail);
+  /// Adds a hypothesis that passed. Returns false, with the state as before, if the likelihood
   /// does not rise by a part of the predicted gain.
-  bool accepted(const Finding& best, const ScoreTest::Outcome& outcome, double threshold_log10_p);
+  bool accepted(const Finding& best, const ScoreTest::Outcome& outcome, Tail);
   /// A lag that was fitted before a term may have been off: refits it, and takes out what it explains then.
   void refit_lag();
   /// A term may be what looked like a lag, as speed does that builds up after a command: it may then explain more without one, and
@@ -97,9 +100,9 @@ class SearchLoop {
     double away, of_all;
   };
   [[nodiscard]] Likelihoods likelihoods_now() const;
-  /// Whether one of them rose. A refit of contacts lowers that of all: their noise covers pushes that persist, which is more than the
-  /// likelihood of single steps asks for. It also decides which rows are away.
-  [[nodiscard]] bool rose_from(const Likelihoods& before) const;
+  /// Whether that of all rose; by Tail::kOfClusters also, whether the other one did. A refit of contacts lowers that of all: their
+  /// noise covers pushes that persist, which is more than the likelihood of single steps asks for. It also decides which rows are away.
+  [[nodiscard]] bool rose_from(const Likelihoods& before, Tail) const;
   void note_stage() { out_.path.push_back({out_.fit, out_.reasons}); }
   /// Gain in log likelihood of all accepted effects.
   [[nodiscard]] double explained() const { return fitter_.log_likelihood_of_all(out_.fit) - base_likelihood_; }
@@ -110,7 +113,7 @@ class SearchLoop {
   [[nodiscard]] std::vector<std::vector<const TrackView*>> tested_units(
       std::size_t most_samples = kEnoughSamples) const;
   void score_dictionary();
-  const Finding* best_of(const ScoreTest::Outcome& outcome, double least_evidence) const;
+  const Finding* best_of(const ScoreTest::Outcome& outcome, double least_evidence, Tail) const;
   static bool of_robots_and_more(const Hypothesis& h);
   /// Evidence of the two single effects (of robots, and of the other covariate) if either is significant: the
   /// alternative to their combination.
@@ -128,16 +131,17 @@ class SearchLoop {
   /// Adds the hypotheses of a family that pass the tests, of each name the one with the most evidence, by kind and name. `screening`:
   /// only clear ones.
   void add_candidates(const Dictionary& family, bool general, double least_evidence, Candidates& best,
-                      bool screening = false);
+                      Tail tail = Tail::kOfColumns, bool screening = false);
   /// Those of all families, in the order of their evidence. `screening`: only clear ones.
-  std::vector<GeneralTerm> general_candidates(bool screening);
+  std::vector<GeneralTerm> general_candidates(Tail, bool screening);
   /// Adds a term. Returns false, with the state as before, if the likelihood does not rise. `attempt`: noted as
   /// failed.
   bool fits(GeneralTerm one, const Attempt& attempt);
   /// A travelling wave with more evidence than the best hypothesis, which may be a proxy of it: adds the wave. A wave that
   /// repeats neither within a run nor on the floor is left to the other hypotheses: it may be a proxy itself.
   bool accept_wave(double evidence);
-  /// Whether a term is an effect on the speed of the position or of what only rises in a run, as time does, and no moving circle itself.
+  /// Whether a term is an effect on the speed of the position or of what only rises in a run, as time does, for all robots or each,
+  /// and no moving circle itself.
   [[nodiscard]] bool may_be_part_of_circle(std::size_t t) const;
   /// Whether effects of both were found that a moving circle may replace. Its further proxies would cost many rounds.
   [[nodiscard]] bool has_parts_of_circle() const;
@@ -149,7 +153,7 @@ class SearchLoop {
   bool accept_further_circle();
   /// Adds the general term with the most evidence that fits. If the error is near what the model expects, only a clear one: an effect
   /// that looks like noise raises what the model expects. Returns whether there is one.
-  bool accept_general();
+  bool accept_general(Tail);
 
   // Removals and exchanges (search_exchanges.cpp).
 

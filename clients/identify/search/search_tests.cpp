@@ -26,11 +26,11 @@ void SearchLoop::score_dictionary() {
   score_test_.emplace(fitter_, out_.fit.model, units, dictionary_);
 }
 
-const Finding* SearchLoop::best_of(const ScoreTest::Outcome& outcome, double least_evidence) const {
+const Finding* SearchLoop::best_of(const ScoreTest::Outcome& outcome, double least_evidence, Tail tail) const {
   const Finding* best = nullptr;
   for (const Finding& f : outcome.findings) {
     if (!good(f, outcome.threshold_log10_p) || f.evidence < least_evidence ||
-        failed_.contains({Attempt::Kind::kNamed, {hypothesis(f).name}}))
+        failed_.contains({Attempt::Kind::kNamed, {hypothesis(f).name}, tail}))
       continue;
     if (of_robots_and_more(hypothesis(f)) && parts_evidence(hypothesis(f), outcome) > f.evidence) continue;
     if (best == nullptr || f.evidence > best->evidence) best = &f;
@@ -71,8 +71,9 @@ bool SearchLoop::clear(const Finding& f, double threshold) {
 bool SearchLoop::leaves_hypothesis() {
   constexpr double kFair = 0.02;
   score_dictionary();
-  const ScoreTest::Outcome outcome = score_test_->test(kSeed + static_cast<std::uint64_t>(round_));
-  return best_of(outcome, kFair * explained()) != nullptr;
+  const ScoreTest::Outcome outcome =
+      score_test_->test(kSeed + static_cast<std::uint64_t>(round_), Tail::kOfColumns);
+  return best_of(outcome, kFair * explained(), Tail::kOfColumns) != nullptr;
 }
 
 void SearchLoop::note_rejected(const ScoreTest::Outcome& outcome) {
