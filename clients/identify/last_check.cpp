@@ -46,10 +46,35 @@ bool holds(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-/// The error of a model on the tracks that choose; infinite if it fails to predict rows that the base model predicts.
-double error_mm(const Judged& judged, std::size_t rows) {
-  return judged.errors.rows == rows ? judged.errors.rmse_mm() : INFINITY;
-}
+/// The error of models on the tracks that choose: each forecast counts by the variance that the base model expects of it. Otherwise a
+/// few, made before the heading is known or in a crowd, would decide by chance.
+class Yardstick {
+ public:
+  Yardstick(const Evaluation& choosing, const Judged& base) : set_(choosing.set()), rows_(base.errors.rows) {
+    for (const Forecast& p : base.forecasts) {
+      const double expected_mm2 = p.expected_error_mm * p.expected_error_mm;
+      weights_.push_back(expected_mm2 > 0 && std::isfinite(expected_mm2) ? 1 / expected_mm2 : 0);
+    }
+  }
+  /// Infinite if the model fails to predict rows that the base model predicts.
+  [[nodiscard]] double error_mm(const Judged& judged) const {
+    if (judged.errors.rows != rows_ || judged.forecasts.size() != weights_.size()) return INFINITY;
+    double sum = 0, all = 0;
+    for (std::size_t i = 0; i < weights_.size(); ++i) {
+      const Forecast& p = judged.forecasts[i];
+      const std::optional<Eigen::Vector2d> error = error_of(set_.runs[p.run].tracks[p.place], p);
+      if (!error) continue;
+      sum += weights_[i] * error->squaredNorm();
+      all += weights_[i];
+    }
+    return all > 0 ? std::sqrt(sum / all) : judged.errors.rmse_mm();
+  }
+
+ private:
+  const MeasuredSet& set_;
+  std::size_t rows_;
+  std::vector<double> weights_;
+};
 
 /// Everything about dropped effects leaves the findings, except that they were dropped.
 void note_dropped(Findings& f, const Stage& last) {
@@ -76,11 +101,11 @@ struct Trial {
 };
 
 Trial trial_of(const Fitter& fitter, const FitState& fit, std::size_t t, const Evaluation& choosing,
-               const ForecastTimes& times, const Judged& with) {
+               const Yardstick& yardstick, const ForecastTimes& times, const Judged& with) {
   FitState without = without_term(fitter, fit, t);
-  const double with_mm = with.errors.rmse_mm();
+  const double with_mm = yardstick.error_mm(with);
   Judged judged = choosing.judge(without, times);
-  const double without_mm = error_mm(judged, with.errors.rows);
+  const double without_mm = yardstick.error_mm(judged);
   const HeldOutGain gain = held_out_gain(fit.model, without.model, with.tracks, choosing.of(), fitter.threads());
   // Effects of the measurement hardly change predicted positions. They must not raise the error; if their gain is beyond chance, not
   // clearly.
@@ -94,14 +119,14 @@ Trial trial_of(const Fitter& fitter, const FitState& fit, std::size_t t, const E
 
 /// Takes out terms one at a time: of those that do not help the one with the least gain. `with`: the model, judged. Returns what is
 /// left, judged.
-Judged without_useless(Findings& f, const Fitter& fitter, const Evaluation& choosing, const ForecastTimes& times,
-                       Judged with) {
+Judged without_useless(Findings& f, const Fitter& fitter, const Evaluation& choosing, const Yardstick& yardstick,
+                       const ForecastTimes& times, Judged with) {
   for (;;) {
     f.check.gains.clear();
     std::optional<Trial> worst;
     std::size_t place = 0;
     for (std::size_t t = 0; t < f.found.fit.model.terms.size(); ++t) {
-      Trial trial = trial_of(fitter, f.found.fit, t, choosing, times, with);
+      Trial trial = trial_of(fitter, f.found.fit, t, choosing, yardstick, times, with);
       f.check.gains.push_back(trial.gain);
       if (!trial.useless || (worst && !(trial.gain.nat < worst->gain.nat))) continue;
       worst = std::move(trial);
@@ -143,22 +168,23 @@ void choose_on_held_out(Findings& f, const Fitter& fitter, const Evaluation& cho
   const std::vector<Stage> path = path_to(f.found);
   std::vector<Judged> judged;
   std::vector<Candidate> candidates;
+  std::optional<Yardstick> yardstick;
   for (const Stage& stage : path) {
     judged.push_back(choosing.judge(stage.fit, times));
+    if (!yardstick) yardstick.emplace(choosing, judged.front());
     const std::vector<Term>& terms = stage.fit.model.terms;
     const auto moving = std::count_if(terms.begin(), terms.end(), [](const Term& t) { return !on_measurement(t); });
-    candidates.push_back({static_cast<std::size_t>(moving), error_mm(judged.back(), judged.front().errors.rows)});
+    candidates.push_back({static_cast<std::size_t>(moving), yardstick->error_mm(judged.back())});
     f.check.path.push_back({effects_of(stage.fit.model), candidates.back().rmse_mm});
   }
   f.check.kept = smallest_of_the_best(candidates);
   f.found.fit = path[f.check.kept].fit;
   f.found.reasons = path[f.check.kept].reasons;
-  const std::size_t rows = judged.front().errors.rows;
-  const Judged left_over = without_useless(f, fitter, choosing, times, std::move(judged[f.check.kept]));
+  const Judged left_over = without_useless(f, fitter, choosing, *yardstick, times, std::move(judged[f.check.kept]));
   const MotionModel &left = f.found.fit.model, &base = path.front().fit.model;
   const bool is_base = left.terms.empty() && left.base.command_lag_s == base.base.command_lag_s;
   // Negated, so that an error that is no number does not pass.
-  if (is_base || !(error_mm(left_over, rows) <= candidates.front().rmse_mm * (1 + kSameError))) {
+  if (is_base || !(yardstick->error_mm(left_over) <= candidates.front().rmse_mm * (1 + kSameError))) {
     f.found.fit = path.front().fit;
     f.found.reasons.clear();
     f.check.gains.clear();

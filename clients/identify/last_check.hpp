@@ -13,7 +13,8 @@ namespace kilotwin::identify {
 void keep_predictive_terms(const Fitter&, const MeasuredSet& train, const ForecastTimes&, Search& found);
 
 /// Sets `fit`, `reasons` and `check` of the findings, and keeps of the findings only what concerns terms of this model:
-///   - of the models on the path of the search the smallest whose error is within 0.1 % of the least (final_check.hpp);
+///   - of the models on the path of the search the smallest whose error is within 0.1 % of the least (final_check.hpp). Each forecast
+///     counts by the inverse of the variance that the base model expects of it;
 ///   - then takes out, one at a time, terms whose gain in log likelihood is negative beyond two standard errors; terms whose
 ///     gain is negative and which do not lower the error clearly; and terms without which the error is no larger;
 ///   - the base model, if the result predicts worse than it.
