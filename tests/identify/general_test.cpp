@@ -178,7 +178,7 @@ TEST(MovingCircles, StandIfTheyHardlyMove) {
   auto&& [set, fitter, base] = BaseFit(small({patch}));
   const identify::Search found =
       identify::search(fitter, base, identify::WorkLog({}), [](const FitState&) { return true; });
-  for (auto& r : found.rejected) printf("%s %g %g\n", r.name.c_str(), r.log10_p, r.threshold_log10_p);
+
   ASSERT_FALSE(found.fit.model.terms.empty());
   for (const identify::Term& term : found.fit.model.terms)
     EXPECT_EQ(term.name.find("time"), std::string::npos) << term.name;

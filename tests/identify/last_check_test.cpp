@@ -78,6 +78,32 @@ TEST_F(LastCheck, RefusesAModelThatPredictsWorse) {
   EXPECT_EQ(f.check.dropped, std::vector<std::string>{"speed-by-time"});
 }
 
+TEST(LastCheckWithoutHeadings, IsNotDecidedByForecastsBeforeTheHeadingIsKnown) {
+  // At first forecasts are off by tens of mm. Later ones show the effect, which a plain mean over all of them hardly sees.
+  truth::Scene scene = small({truth::battery_by_the_clock()});
+  scene.heading = false;
+  MeasuredSet whole = set_of(scene, played(scene));
+  hold_out_for_choice(whole);
+  auto&& [set, fitter, base] = BaseFit(std::move(whole));
+  const Evaluation choosing(set, nullptr, Tracks::kChoosing, 2);
+  const ForecastTimes times{10, 5, 10};
+  const Dictionary all = dictionary_of(extent_of(base.tracks), {});
+  FitState battery = base;
+  const auto h = std::find_if(all.hypotheses.begin(), all.hypotheses.end(),
+                              [](const Hypothesis& one) { return one.name == "speed-by-time"; });
+  ASSERT_NE(h, all.hypotheses.end());
+  battery.model.terms.push_back(all.term_of(*h, 1));
+  fitter.fit(battery, 2);
+  Findings f(base, {battery, {{}}, {{base, {}}}, {}, {}, {}, {}});
+  choose_on_held_out(f, fitter, choosing, times);
+  ASSERT_EQ(f.check.path.size(), 2U);
+  const double plain =
+      choosing.judge(battery, times).errors.rmse_mm() / choosing.judge(base, times).errors.rmse_mm();
+  const double by_variance = f.check.path[1].rmse_mm / f.check.path[0].rmse_mm;
+  EXPECT_LT(by_variance, 0.9);
+  EXPECT_LT(by_variance, 0.95 * plain);
+}
+
 TEST_F(LastCheck, KeepsTheBaseModelInPlaceOfWhatWasFound) {
   Findings f = found(with({"speed-by-time", "turning-by-heading"}));
   f.check.gains.resize(2);

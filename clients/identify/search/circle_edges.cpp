@@ -70,7 +70,7 @@ double edge_of_curve(const FitState& state, const Term& term) {
   return edge_mm;
 }
 
-/// Moves of centre and radius at the start and at the end of a run, and of both together. What stands keeps standing.
+/// Moves of centre and radius at the start and at the end of a run, and of both together. A circle that stands gets no motion.
 std::vector<MoveNumber> moves_of(const MovingPoint& point, double duration_s) {
   struct Part {
     double MovingPoint::*at_start;

@@ -140,8 +140,8 @@ class SearchLoop {
   /// A travelling wave with more evidence than the best hypothesis, which may be a proxy of it: adds the wave. A wave that
   /// repeats neither within a run nor on the floor is left to the other hypotheses: it may be a proxy itself.
   bool accept_wave(double evidence);
-  /// Whether a term is an effect on the speed of the position or of what only rises in a run, as time does, for all robots or each,
-  /// and no moving circle itself.
+  /// Whether a term is an effect on the speed: of the position or of what only rises in a run, for all robots or each. Moving circles are
+  /// none.
   [[nodiscard]] bool may_be_part_of_circle(std::size_t t) const;
   /// Whether effects of both were found that a moving circle may replace. Its further proxies would cost many rounds.
   [[nodiscard]] bool has_parts_of_circle() const;

@@ -1,5 +1,6 @@
 // Laws of moving circles: the derivatives of a curve by its centre, and a disc that is found and followed.
 #include "clients/identify/search/moving_circles.hpp"
+#include "clients/identify/search/circle_edges.hpp"
 
 #include <gtest/gtest.h>
 
@@ -134,6 +135,33 @@ TEST(MovingCircles, ADiscThatMovesAndGrowsIsFollowed) {
   EXPECT_NEAR(found.growth_mm_s, truth.growth_mm_s, 0.5);
   EXPECT_NEAR(found.x_mm_at(60), truth.x_mm_at(60), 15);
   EXPECT_NEAR(found.y_mm_at(60), truth.y_mm_at(60), 15);
+}
+
+TEST(MovingCircles, ASharpEdgeIsFoundInPlaceOfACurve) {
+  const MovingPoint truth{-50, 60, 0, 0, 1.2};
+  constexpr double kRadius_mm = 60;
+  const MeasuredSet set = wandering(truth, kRadius_mm, 0.5);
+  const Fitter fitter(set, 2);
+  FitState state(set);
+  fitter.fit(state, 3);
+  const Extent extent = extent_of(state.tracks);
+  const std::vector<MovingCircle> circles = moving_circles_of(fitter, state, extent);
+  ASSERT_FALSE(circles.empty());
+  const Dictionary dictionary = dictionary_of_circles(state, extent, circles);
+  state.model.terms.push_back(dictionary.term_of(dictionary.hypotheses[1], 1));
+  fitter.fit(state, 2);
+  refine_curves(fitter, state, 0);
+  refine_moving_circle(fitter, state, 0);
+  const double likelihood = fitter.log_likelihood(state);
+  Search found{state, {{}}, {{state, {{}}}}, {}, {}, {}, {}};
+  ASSERT_TRUE(sharpen_moving_circles(fitter, found, UINT64_MAX));
+  EXPECT_GT(fitter.log_likelihood(found.fit), likelihood);
+  const Factor& edge = found.fit.model.terms[0].blocks.front().basis.factors.front();
+  ASSERT_EQ(edge.shape, Factor::Shape::kAtLeast);
+  EXPECT_NEAR(edge.axis.point.x_mm_at(30), truth.x_mm, 4);
+  EXPECT_NEAR(edge.axis.point.y_mm_at(30), truth.y_mm, 4);
+  EXPECT_NEAR(edge.points.front() + edge.axis.point.growth_mm_s * 30, kRadius_mm + truth.growth_mm_s * 30, 4);
+  EXPECT_NEAR(edge.axis.point.growth_mm_s, truth.growth_mm_s, 0.1);
 }
 
 }  // namespace
