@@ -60,7 +60,7 @@ bool SearchLoop::changed() {
 bool SearchLoop::accept_hypothesis(Tail tail) {
   if (tail == Tail::kOfClusters && !limit().empty()) return false;
   say(kTest, "testing hypotheses");
-  score_dictionary();
+  score_dictionary(tail);
   const ScoreTest::Outcome outcome = score_test_->test(kSeed + static_cast<std::uint64_t>(round_), tail);
   if (tail == Tail::kOfColumns) note_rejected(outcome);
   // A hypothesis that fails leaves the state as it was, so that the outcome of the tests remains valid.

@@ -31,7 +31,7 @@ void SearchLoop::add_candidates(const Dictionary& family, bool general, double l
   const ColumnGroups read = columns_read_by_test(out_.fit.model, family);
   const std::vector<Unit> units =
       linearise(out_.fit.model, tested_units(screening ? kEnoughForScreening : kEnoughForGeneral), blocks,
-                {100, fitter_.threads(), -1, &read});
+                {stretch_s(tail), fitter_.threads(), -1, &read});
   const ScoreTest test(fitter_, out_.fit.model, units, family);
   const ScoreTest::Outcome outcome = test.test(kSeed + 100 + static_cast<std::uint64_t>(round_), tail);
   for (const Finding& f : outcome.findings) {

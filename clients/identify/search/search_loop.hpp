@@ -112,7 +112,10 @@ class SearchLoop {
   /// The tracks of the test. A large set: every n-th unit.
   [[nodiscard]] std::vector<std::vector<const TrackView*>> tested_units(
       std::size_t most_samples = kEnoughSamples) const;
-  void score_dictionary();
+  /// Length of the stretches of tracks that the test takes as independent. The second look is made where a large effect may be left: its
+  /// scores keep their sign as long as robots keep their place or command. Shorter stretches then leave more of them, and more power.
+  static constexpr double stretch_s(Tail tail) { return tail == Tail::kOfClusters ? 30 : 100; }
+  void score_dictionary(Tail tail = Tail::kOfColumns);
   const Finding* best_of(const ScoreTest::Outcome& outcome, double least_evidence, Tail) const;
   static bool of_robots_and_more(const Hypothesis& h);
   /// Evidence of the two single effects (of robots, and of the other covariate) if either is significant: the

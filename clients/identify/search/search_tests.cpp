@@ -16,13 +16,13 @@ std::vector<std::vector<const TrackView*>> SearchLoop::tested_units(std::size_t 
   return part.size() >= 6 ? part : units;
 }
 
-void SearchLoop::score_dictionary() {
+void SearchLoop::score_dictionary(Tail tail) {
   dictionary_ = dictionary_of(extent_, out_.fit.model.terms);
   std::vector<Block> blocks = blocks_of(out_.fit.model);
   blocks.insert(blocks.end(), dictionary_.blocks.begin(), dictionary_.blocks.end());
   const ColumnGroups read = columns_read_by_test(out_.fit.model, dictionary_);
   const std::vector<Unit> units =
-      linearise(out_.fit.model, tested_units(), blocks, {100, fitter_.threads(), -1, &read});
+      linearise(out_.fit.model, tested_units(), blocks, {stretch_s(tail), fitter_.threads(), -1, &read});
   score_test_.emplace(fitter_, out_.fit.model, units, dictionary_);
 }
 
