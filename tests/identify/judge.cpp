@@ -65,7 +65,8 @@ int usage() {
       "usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--robots N] [--runs N] [--seconds S] "
       "[--nothing N] [--random N] [--coverage N] [--rivals] [--jobs N] [--all | "
       "SCENE|nothing:SEED|random:SEED...]\n"
-      "Without scenes and --nothing: all scenes, and 300 small sets without an effect. Scenes: {}\n",
+      "With none of scenes, --nothing, --random and --coverage: all scenes, and 300 small sets without an effect. "
+      "Scenes: {}\n",
       fmt::join(scenario_names(), " "));
   return 2;
 }
@@ -345,7 +346,7 @@ int judge_rivals(const Arguments& arguments, const fs::path& folder) {
   comparison.print_header();
   for (const std::string& name : arguments.scenes) {
     const Scene scene = scene_of(arguments, name);
-    const Play played = play(scene, arguments.seed);
+    const Play played = play(scene, seed_of(arguments, name));
     const std::vector<Prediction> oracle = oracle_of(scene, played, arguments.small ? 30 : 100);
     const Verdict verdict = try_set(arguments, scene, played, oracle, folder / scene.name);
     if (!verdict.failure.empty()) ++failed;
