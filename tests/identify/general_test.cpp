@@ -27,7 +27,6 @@ namespace kilotwin {
 namespace {
 
 using identify::FitState;
-using identify::Fitter;
 using identify::MeasuredSet;
 
 TEST(CommandLag, IsFittedInPlaceOfEffects) {

@@ -87,7 +87,8 @@ struct CirclePeak {
 CirclePeak climbed(const std::vector<SpeedPoint>& points, const ScanTotal& total, CirclePeak peak,
                    double spacing_mm) {
   int steps = 0;
-  for (double length = 0.5 * spacing_mm; length > 0.02 * spacing_mm; length /= 2) {
+  double length = 0.5 * spacing_mm;
+  while (length > 0.02 * spacing_mm) {
     for (bool better = true; better && steps < kMostMoves; ++steps) {
       better = false;
       // Each number, then both positions and both radii together.
@@ -105,6 +106,7 @@ CirclePeak climbed(const std::vector<SpeedPoint>& points, const ScanTotal& total
         }
       }
     }
+    length /= 2;
   }
   return peak;
 }
@@ -244,6 +246,7 @@ std::vector<MovingCircle> moving_circles_of(const Fitter& fitter, const FitState
     found[i].resize(1);
   });
   std::vector<CirclePeak> peaks;
+  peaks.reserve(found.size());
   for (const auto& of_start : found) peaks.push_back(of_start.front());
   const auto by_gain = [](const CirclePeak& a, const CirclePeak& b) { return a.gain > b.gain; };
   std::stable_sort(peaks.begin(), peaks.end(), by_gain);

@@ -150,7 +150,8 @@ Disc best_disc(const std::vector<MapPoint>& points, const Extent& e) {
       for (const double radius : kDiscRadii)
         better({e.x_low_mm + (i + 0.5) / kPlacesAcross * (e.x_high_mm - e.x_low_mm),
                 e.y_low_mm + (j + 0.5) / kPlacesAcross * (e.y_high_mm - e.y_low_mm), radius * side});
-  for (double length = side / kPlacesAcross; length > side / 400; length /= 2) {
+  double length = side / kPlacesAcross;
+  while (length > side / 400) {
     for (bool moved = true; moved;) {
       moved = false;
       for (double Disc::*const number : {&Disc::x_mm, &Disc::y_mm, &Disc::radius_mm}) {
@@ -161,6 +162,7 @@ Disc best_disc(const std::vector<MapPoint>& points, const Extent& e) {
         }
       }
     }
+    length /= 2;
   }
   return best;
 }
