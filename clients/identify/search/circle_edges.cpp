@@ -14,11 +14,6 @@ namespace {
 
 using Shape = Factor::Shape;
 
-/// Prior standard deviation of the step before its first fit: of gains, or of rad/s.
-constexpr double kStepSd = 0.3;
-/// Log of the number of choices for one number of a circle.
-constexpr double kNumberCost = 3;
-
 MovingPoint& point_of(Term& term) { return term.blocks.front().basis.factors.front().axis.point; }
 
 /// Whether all blocks are curves about the same centre, which moves or grows.
@@ -109,8 +104,8 @@ std::vector<MoveNumber> moves_of(const MovingPoint& point, double duration_s) {
 double cost_of(const Term& term) {
   const Factor& f = term.blocks.front().basis.factors.front();
   const MovingPoint& p = f.axis.point;
-  return kNumberCost * (2.0 + (p.velocity_x_mm_s != 0 || p.velocity_y_mm_s != 0 ? 2 : 0) +
-                        (p.growth_mm_s != 0 ? 1 : 0) + (f.shape == Shape::kAtLeast ? 1 : 0));
+  return kCircleNumber * (2.0 + (p.velocity_x_mm_s != 0 || p.velocity_y_mm_s != 0 ? 2 : 0) +
+                          (p.growth_mm_s != 0 ? 1 : 0) + (f.shape == Shape::kAtLeast ? 1 : 0));
 }
 
 }  // namespace
@@ -161,7 +156,7 @@ void put_edges(const Fitter& fitter, FitState& state, std::size_t place, const s
     edge.points = {radii_mm[static_cast<std::size_t>(b)]};
   }
   term.coefficients = Eigen::VectorXd::Zero(circles);
-  term.precision = Eigen::VectorXd::Constant(circles, 1 / (kStepSd * kStepSd));
+  term.precision = Eigen::VectorXd::Constant(circles, 1 / (kCircleSd * kCircleSd));
   settle(fitter, state);
 }
 
@@ -203,9 +198,9 @@ bool sharpen_moving_circles(const Fitter& fitter, Search& found, std::uint64_t m
           point.growth_mm_s = 0;
         }
       }
-      if (!(point_of(trial.model.terms[t]) == at)) try_it(std::move(trial));
+      const MovingPoint& now = point_of(trial.model.terms[t]);
+      if (!(now == at) && !now.stands()) try_it(std::move(trial));
     }
-    if (point_of(best->model.terms[t]).stands()) continue;
     found.fit = std::move(*best);
     sharpened = true;
   }

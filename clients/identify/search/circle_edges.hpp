@@ -10,6 +10,11 @@
 
 namespace kilotwin::identify {
 
+/// Prior standard deviation of coefficients of circles before their first fit: of gains, or of rad/s.
+inline constexpr double kCircleSd = 0.3;
+/// Log of the number of choices for one number of a circle.
+inline constexpr double kCircleNumber = 3;
+
 /// Fits until the likelihood settles: the base speeds move far when a curve becomes a step.
 void settle(const Fitter&, FitState&);
 
@@ -24,8 +29,8 @@ void climb(const Fitter&, FitState&, std::size_t term, double first_mm, const st
 /// Gives each block of a term one step at a radius, mm, in place of its curve, and fits it.
 void put_edges(const Fitter&, FitState&, std::size_t term, const std::vector<double>& radii_mm);
 
-/// Gives each circle that moves or grows an edge in place of its curve if the evidence rises. An edge that stands or does not grow is
-/// preferred if it is as likely. Ends early at `most_work`. Returns whether one got an edge.
+/// Gives each circle that moves or grows an edge in place of its curve if the evidence rises. An edge that only grows or only moves is
+/// preferred if that is as likely; one that does neither would be a patch of the floor, and is left out. Ends early at `most_work`. Returns whether one got an edge.
 bool sharpen_moving_circles(const Fitter&, Search&, std::uint64_t most_work);
 
 }  // namespace kilotwin::identify

@@ -32,10 +32,6 @@ constexpr double kLeastOfEach = 0.25, kLeastCurves = 0.15;
 /// Work that circles may cost: a share of that of the search, between these bounds. Beyond, the map stays unless circles so far are
 /// better. In a small set, two patches cost 1.3 times their search; the lower bound is enough for that.
 constexpr double kShareOfWork = 0.8, kLeastWork = 5e7, kMostOfWork = 1.5e8;
-/// Prior standard deviation of the coefficients before their first fit: of gains, or of rad/s.
-constexpr double kPriorSd = 0.3;
-/// Log of the number of choices for one number of a circle.
-constexpr double kPerNumber = 3;
 
 /// The value of a map where a robot was.
 struct MapPoint {
@@ -239,7 +235,7 @@ void add_curve(const Fitter& fitter, FitState& state, std::size_t place, Target 
   term.coefficients.conservativeResize(had + added);
   term.precision.conservativeResize(had + added);
   term.coefficients.tail(added).setZero();
-  term.precision.tail(added).setConstant(1 / (kPriorSd * kPriorSd));
+  term.precision.tail(added).setConstant(1 / (kCircleSd * kCircleSd));
   for (int pass = 0; pass < 2; ++pass) {
     refit(fitter, state, place);
     settle(fitter, state);
@@ -299,7 +295,7 @@ bool replace_by_circles(const Fitter& fitter, FitState& state, std::size_t place
                                  Term{state.model.terms[place].name, {}, {}, {}});
     add_curve(fitter, circles, place, *target, *disc);
     if (!lies_within(circles.model.terms[place], extent)) break;
-    const double numbers = kPerNumber * 3 * static_cast<double>(circles.model.terms[place].blocks.size());
+    const double numbers = kCircleNumber * 3 * static_cast<double>(circles.model.terms[place].blocks.size());
     const auto better = [&](const FitState& trial) {
       const double value = fitter.log_evidence(trial) - numbers, likelihood = fitter.log_likelihood(trial);
       reached = std::max(reached, likelihood);
