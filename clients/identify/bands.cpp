@@ -50,8 +50,9 @@ class TermBand {
         for (const auto& [i, j] : std::array<std::pair<int, int>, 4>{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}}) {
           std::vector<BlockPlace> beside = places;
           beside[p].factors[f].value += i * (factors[f].high - factors[f].low) / (factors[f].count - 1);
-          const auto rows = static_cast<double>(factors[f].points.size() / factors[f].count);
-          beside[p].factors[f].and_value += j * (factors[f].and_high - factors[f].and_low) / (rows - 1);
+          const std::size_t rows = factors[f].points.size() / factors[f].count;
+          beside[p].factors[f].and_value +=
+              j * (factors[f].and_high - factors[f].and_low) / static_cast<double>(rows - 1);
           widen(band, interval(beside));
         }
       }
@@ -338,7 +339,8 @@ void set_band(identification::EffectMap& map, const MotionModel& model, std::siz
       for (int j = 0; j < map.y_mm_size(); ++j) {
         JsonList &low = *map.add_low(), &high = *map.add_high();
         for (int i = 0; i < map.x_mm_size(); ++i) {
-          const BandPoint& p = (*points)[static_cast<std::size_t>(j * map.x_mm_size() + i)];
+          const BandPoint& p = (*points)[static_cast<std::size_t>(j) * static_cast<std::size_t>(map.x_mm_size()) +
+                                         static_cast<std::size_t>(i)];
           *low.add_values() = json_value(p.low);
           *high.add_values() = json_value(p.high);
         }

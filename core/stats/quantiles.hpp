@@ -35,7 +35,8 @@ template <class T> [[nodiscard]] T upper_median(std::vector<T> values) {
 /// The observed value nearest to the quantile of `share`, 0..1; 0 of none. Reorders the values.
 [[nodiscard]] inline double nearest_quantile(std::vector<double>& values, double share) {
   if (values.empty()) return 0;
-  return order_statistic(values, static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5));
+  return order_statistic(values,
+                         static_cast<std::size_t>(std::lround(share * static_cast<double>(values.size() - 1))));
 }
 
 /// The quantile with linear interpolation between observed values (type 7 of Hyndman and Fan, 1996; numpy's default). NaN

@@ -176,7 +176,10 @@ std::vector<BristleInstant> instants_of(const std::vector<BristleRun>& runs, dou
   for (std::size_t r = 0; r < runs.size(); ++r) {
     const BristleRun& run = runs[r];
     if (run.size() < 2) continue;
-    for (double now_s = run.time_s.front() + kFirst_s; now_s + horizon_s < run.time_s.back(); now_s += kEvery_s) {
+    const double first_s = run.time_s.front() + kFirst_s;
+    const auto count = static_cast<int>(std::ceil((run.time_s.back() - horizon_s - first_s) / kEvery_s));
+    for (int instant = 0; instant < count; ++instant) {
+      const double now_s = first_s + instant * kEvery_s;
       const auto row = [&](double t) {
         return static_cast<std::size_t>(std::upper_bound(run.time_s.begin(), run.time_s.end(), t) -
                                         run.time_s.begin());

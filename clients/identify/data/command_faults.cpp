@@ -55,10 +55,13 @@ double of_rate(const std::vector<ClockTrack>& clock_tracks, const CommandRespons
 /// intervals.
 double best_rate(const std::vector<ClockTrack>& clock_tracks, const CommandResponse& response, double end_s) {
   double low = kSlowestClock, high = kFastestClock, best = 1;
-  for (double until_s = std::min(60.0, end_s);; until_s = std::min(2 * until_s, end_s)) {
+  double until_s = std::min(60.0, end_s);
+  for (;;) {
     const double step = kStep_s / until_s;
     double best_sum = -1e300;
-    for (double rate = low; rate <= high + 0.5 * step; rate += step) {
+    const auto rates = static_cast<int>(std::floor((high - low) / step + 0.5)) + 1;
+    for (int i = 0; i < rates; ++i) {
+      const double rate = low + i * step;
       const double sum = of_rate(clock_tracks, response, rate, until_s);
       if (sum > best_sum) {
         best_sum = sum;
@@ -68,6 +71,7 @@ double best_rate(const std::vector<ClockTrack>& clock_tracks, const CommandRespo
     low = best - 4 * step;
     high = best + 4 * step;
     if (until_s >= end_s) return best;
+    until_s = std::min(2 * until_s, end_s);
   }
 }
 
@@ -282,6 +286,7 @@ void exclude_wrong_clocks(MeasuredSet& set, std::vector<DataFault>& faults) {
     if (segments < 100 || end_s < 20) continue;
     const double rate = best_rate(clock_tracks, response, end_s);
     std::vector<double> gains;
+    gains.reserve(clock_tracks.size());
     for (const ClockTrack& one : clock_tracks)
       gains.push_back(of_rate({one}, response, rate, end_s) - of_rate({one}, response, 1, end_s));
     const double gain = std::accumulate(gains.begin(), gains.end(), 0.0);

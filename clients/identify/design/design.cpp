@@ -287,7 +287,8 @@ class Exchange {
   }
   /// One motion in an interval of any length, short ones as likely as long ones.
   static void overwrite_somewhere(PlannedRobot& robot, std::int64_t end, Draws& draws) {
-    const double longest = static_cast<double>(end / kPlanStep - 1);
+    const std::int64_t steps = end / kPlanStep;
+    const auto longest = static_cast<double>(steps - 1);
     const std::int64_t length = std::llround(std::pow(longest, draws.uniform())) * kPlanStep;
     const std::int64_t latest = std::max<std::int64_t>(0, end - kPlanStep - length) / kPlanStep;
     const std::int64_t from =

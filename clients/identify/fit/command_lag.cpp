@@ -51,9 +51,12 @@ class LagLikelihood {
   double climb(double least_gain) {
     if (height_of_maximum(at(now_s_ - kProbe_s), at(now_s_), at(now_s_ + kProbe_s)) < least_gain) return 0;
     // There is one maximum: climbs on ever finer rasters.
-    for (double step_s = kCoarse_s; step_s > kFine_s; step_s /= 2.5)
+    double step_s = kCoarse_s;
+    while (step_s > kFine_s) {
       for (const double sign : {1.0, -1.0})
         while (moved(sign * step_s)) {}
+      step_s /= 2.5;
+    }
     return at(best_s_) - at(now_s_);
   }
   [[nodiscard]] FitState best() const { return with_lag(best_s_); }

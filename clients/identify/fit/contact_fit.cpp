@@ -117,7 +117,8 @@ void Fitter::fit_walls(FitState& state) const {
       best_value = value;
       best = trial;
     };
-    for (double wall = edge - kInside_mm; wall <= edge + reach + kBeyond_mm; wall += kCoarse_mm) try_at(wall);
+    const auto coarse = static_cast<int>(std::floor((kInside_mm + reach + kBeyond_mm) / kCoarse_mm)) + 1;
+    for (int i = 0; i < coarse; ++i) try_at(edge - kInside_mm + i * kCoarse_mm);
     const double found = side.sign * best.walls.*side.wall;
     if (std::isinf(found)) return false;
     for (const double by : kFine_mm) try_at(found + by);

@@ -1,6 +1,8 @@
 #include "clients/identify/fit/fitter.hpp"
 
 #include <algorithm>
+#include <functional>
+#include <numeric>
 
 namespace kilotwin::identify {
 
@@ -15,7 +17,16 @@ void Fitter::fit_noise(FitState& state) const {
 }
 
 NoiseInterval Fitter::noise_interval(const FitState& state) const {
-  return identify::noise_interval(state.model, state.tracks.some_tracks(kEnoughSamples), headings_, threads_);
+  const std::vector<const TrackView*> some = state.tracks.some_tracks(kEnoughSamples);
+  const auto samples = [](const std::vector<const TrackView*>& tracks) {
+    return std::transform_reduce(tracks.begin(), tracks.end(), 0.0, std::plus<>(), [](const TrackView* view) {
+      return static_cast<double>(view->track->samples.size());
+    });
+  };
+  double all = 0;
+  for (const std::vector<const TrackView*>& unit : state.tracks.units()) all += samples(unit);
+  const NoiseRestriction columns = noise_restriction(*this, state, samples(some) / std::max(1.0, all));
+  return identify::noise_interval(state.model, some, columns, headings_, threads_);
 }
 
 void Fitter::fit_base(FitState& state) const {
@@ -68,6 +79,19 @@ void Fitter::fit(FitState& state, int passes) const { fit_passes(state, passes);
 double Fitter::fit_for_likelihood(FitState& state, int passes) const {
   const std::optional<double> known = fit_passes(state, passes);
   return known ? *known : log_likelihood(state);
+}
+
+void Fitter::fit_until_settled(FitState& state) const {
+  constexpr int kFirst = 2, kMostMore = 6;
+  // Beside a large error that the model lacked, a fit of two passes is far from its end; most fits are near it.
+  constexpr double kHardly = 20, kHardlyOfGain = 0.02;
+  const double before = log_likelihood(state);
+  double likelihood = fit_for_likelihood(state, kFirst);
+  for (int pass = 0; pass < kMostMore; ++pass) {
+    const double found = fit_for_likelihood(state, 1), rise = found - likelihood;
+    likelihood = found;
+    if (rise < std::max(kHardly, kHardlyOfGain * (likelihood - before))) return;
+  }
 }
 
 std::optional<double> Fitter::fit_passes(FitState& state, int passes) const {

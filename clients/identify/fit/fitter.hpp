@@ -38,6 +38,8 @@ class Fitter {
   void fit(FitState&, int passes) const;
   /// The same. Returns the log_likelihood() of the result, which the last step knows in most cases.
   double fit_for_likelihood(FitState&, int passes) const;
+  /// The same until the likelihood hardly rises: for a new term, which may change everything.
+  void fit_until_settled(FitState&) const;
   /// Refits the noise, on a subset of the tracks.
   void fit_noise(FitState&) const;
   /// Refits the contact noise, on a subset of the tracks.
@@ -58,6 +60,8 @@ class Fitter {
   /// Log evidence: the marginal likelihood over the coefficients in Laplace's approximation, up to a constant
   /// common to all models.
   [[nodiscard]] double log_evidence(const FitState&) const;
+  /// Information of base parameters and coefficients, with their priors. The biases are eliminated.
+  [[nodiscard]] Eigen::MatrixXd information(const FitState&) const;
   /// Adds the prior of the base parameters to information and score.
   void add_base_prior(const MotionModel&, Eigen::MatrixXd& information, Eigen::VectorXd& score) const;
   /// Moves base parameters, coefficients and biases by a step in all columns.

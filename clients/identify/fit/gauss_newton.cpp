@@ -86,6 +86,8 @@ bool acts_on_speed(const Block& block) {
 
 }  // namespace
 
+Eigen::MatrixXd Fitter::information(const FitState& state) const { return equations_of(*this, state).information; }
+
 BasePrior Fitter::prior_beside(const MotionModel& model, double by_effects) const {
   const bool nominal = std::none_of(model.terms.begin(), model.terms.end(), [](const Term& term) {
     return std::any_of(term.blocks.begin(), term.blocks.end(), acts_on_speed);

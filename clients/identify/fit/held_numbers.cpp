@@ -203,7 +203,7 @@ class Collector {
     constexpr double kLeast = 1e-6;
     Eigen::MatrixXd prior;
     if (is_map_of_nodes(f)) {
-      constexpr auto n = static_cast<Eigen::Index>(kDeviationNodes * kDeviationNodes);
+      constexpr auto n = Eigen::Index{kDeviationNodes} * kDeviationNodes;
       const Eigen::Map<const Eigen::ArrayXd> values(f.points.data(), static_cast<Eigen::Index>(f.points.size()));
       const double scale = f.known.empty() ? 1 : f.known[0];
       const double variance = std::max(scale * scale * (values - values.mean()).square().mean(), kLeast);

@@ -19,40 +19,25 @@
 namespace kilotwin::identify {
 namespace {
 
-/// Indices of the fitted variances, as logarithms: process noise first, then measurement noise.
-enum : Eigen::Index { kFactor, kWheel, kHeading, kDrift, kPosition, kMeasuredHeading, kNoises };
-constexpr std::size_t kSpreading = kPosition;
-using NoiseVector = Eigen::Matrix<double, kNoises, 1>;
+using namespace fitted_variance;
+constexpr std::size_t kSpreading = kPosition;  ///< number of process noises
+using NoiseVector = FittedVariances;           ///< of their logarithms, where nothing else is said
 using PoseByBias = Eigen::Matrix<double, 3, 2>;
 
 /// A lower variance has no influence; a higher one hides everything.
-constexpr std::array<double, kNoises> kLeast = {1e-6, 1e-4, 1e-8, 1e-6, 1e-4, 1e-6},
-                                      kMost = {1, 100, 1, 100, 1e4, 10};
+constexpr std::array<double, kCount> kLeast = {1e-6, 1e-4, 1e-8, 1e-6, 1e-4, 1e-6},
+                                     kMost = {1, 100, 1, 100, 1e4, 10};
 
-NoiseVector logs_of(const Noise& n) {
-  NoiseVector v;
-  v << n.factor_s, n.wheel_mm2_s, n.heading_rad2_s, n.drift_mm2_s, n.position_mm2, n.heading_rad2;
-  return v.array().log();
-}
+NoiseVector logs_of(const Noise& noise) { return fitted_variances(noise).array().log(); }
 /// Variances within bounds.
 NoiseVector variances(const NoiseVector& logs) {
   NoiseVector v;
-  for (Eigen::Index i = 0; i < kNoises; ++i) {
+  for (Eigen::Index i = 0; i < kCount; ++i) {
     const auto k = static_cast<std::size_t>(i);
     v[i] = std::clamp(std::exp(logs[i]), kLeast[k], kMost[k]);
   }
   return v;
 }
-Noise with(Noise noise, const NoiseVector& v) {
-  noise.factor_s = v[kFactor];
-  noise.wheel_mm2_s = v[kWheel];
-  noise.heading_rad2_s = v[kHeading];
-  noise.drift_mm2_s = v[kDrift];
-  noise.position_mm2 = v[kPosition];
-  noise.heading_rad2 = v[kMeasuredHeading];
-  return noise;
-}
-
 /// From one measurement to the next, linearised about the filter's path.
 struct FilterInterval {
   FilterInterval() {
@@ -221,6 +206,7 @@ std::vector<double> by_stretches(const Path& path, const NoiseVector& variance) 
   log_likelihood(path, variance, nullptr,
                  [&](double time_s, double value) { sums[std::floor(time_s / kStretch_s)] += value; });
   std::vector<double> out;
+  out.reserve(sums.size());
   for (const auto& [stretch, sum] : sums) out.push_back(sum);
   return out;
 }
@@ -253,16 +239,22 @@ Biases biases_of(const MotionModel& model, const std::vector<Path>& paths) {
   return out;
 }
 
-/// Maximisation of a likelihood over the logarithms of the variances. With `biases` it is the marginal likelihood over them, in
-/// Laplace's approximation; without, they are known.
+/// What is estimated beside the noise, and integrated over.
+struct Estimated {
+  Biases biases;
+  NoiseRestriction columns;
+};
+
+/// Maximisation of a likelihood over the logarithms of the variances. With `estimated` it is the marginal likelihood over biases and
+/// columns, in Laplace's approximation; without, they are known.
 class Climb {
  public:
-  Climb(const std::vector<Path>& paths, const Biases* biases, bool has_headings, std::uint32_t threads)
-      : paths_(paths), biases_(biases), has_headings_(has_headings), threads_(threads) {
+  Climb(const std::vector<Path>& paths, const Estimated* estimated, bool has_headings, std::uint32_t threads)
+      : paths_(paths), estimated_(estimated), has_headings_(has_headings), threads_(threads) {
     for (const Path& path : paths) samples_ += path.stretches.size();
   }
 
-  using Square = Eigen::Matrix<double, kNoises, kNoises>;
+  using Square = Eigen::Matrix<double, kCount, kCount>;
   /// Settings of a search: the variance that stays (-1: none), the most steps, the gain at which it ends, and the inverse curvature at
   /// its start.
   struct Search {
@@ -401,38 +393,41 @@ class Climb {
   }
 
   /// Number of variances that these data have.
-  [[nodiscard]] Eigen::Index size() const { return has_headings_ ? kNoises : kMeasuredHeading; }
+  [[nodiscard]] Eigen::Index size() const { return has_headings_ ? kCount : kMeasuredHeading; }
 
  private:
   [[nodiscard]] std::vector<double> values(const std::vector<NoiseVector>& at) const {
     std::vector<NoiseVector> variance;
+    variance.reserve(at.size());
     for (const NoiseVector& logs : at) variance.push_back(variances(logs));
     std::vector<std::vector<double>> of_paths(paths_.size(), std::vector<double>(at.size()));
-    std::vector<std::vector<BiasSums>> sums_of_paths(biases_ != nullptr ? paths_.size() : 0,
+    std::vector<std::vector<BiasSums>> sums_of_paths(estimated_ != nullptr ? paths_.size() : 0,
                                                      std::vector<BiasSums>(at.size()));
     os::in_parallel(paths_.size(), threads_, [&](std::size_t p) {
       for (std::size_t i = 0; i < at.size(); ++i)
         of_paths[p][i] =
-            log_likelihood(paths_[p], variance[i], biases_ != nullptr ? &sums_of_paths[p][i] : nullptr);
+            log_likelihood(paths_[p], variance[i], estimated_ != nullptr ? &sums_of_paths[p][i] : nullptr);
     });
     std::vector<double> sums(at.size());
     for (std::size_t i = 0; i < at.size(); ++i) {
       for (const std::vector<double>& of_path : of_paths) sums[i] += of_path[i];
       // The prior of the search would hold a variance that may be 0 near its usual value.
-      sums[i] += biases_ != nullptr ? over_biases(sums_of_paths, i) : log_prior(at[i]);
+      sums[i] += estimated_ != nullptr ? over_biases(sums_of_paths, i) + estimated_->columns(variance[i])
+                                       : log_prior(at[i]);
     }
     return sums;
   }
   /// The integral over the biases adds this to the log likelihood of the model's biases, up to a constant.
   [[nodiscard]] double over_biases(const std::vector<std::vector<BiasSums>>& of_paths, std::size_t i) const {
-    std::vector<BiasSums> robots(biases_->from_prior.size());
+    const Biases& biases = estimated_->biases;
+    std::vector<BiasSums> robots(biases.from_prior.size());
     for (std::size_t r = 0; r < robots.size(); ++r) {
-      robots[r].score = biases_->precision * biases_->from_prior[r];
-      robots[r].information.diagonal().setConstant(biases_->precision);
+      robots[r].score = biases.precision * biases.from_prior[r];
+      robots[r].information.diagonal().setConstant(biases.precision);
     }
     for (std::size_t p = 0; p < of_paths.size(); ++p) {
-      robots[biases_->robot_of_path[p]].score += of_paths[p][i].score;
-      robots[biases_->robot_of_path[p]].information += of_paths[p][i].information;
+      robots[biases.robot_of_path[p]].score += of_paths[p][i].score;
+      robots[biases.robot_of_path[p]].information += of_paths[p][i].information;
     }
     double sum = 0;
     for (const BiasSums& robot : robots)
@@ -457,7 +452,7 @@ class Climb {
   }
 
   const std::vector<Path>& paths_;
-  const Biases* biases_;
+  const Estimated* estimated_;
   const bool has_headings_;
   const std::uint32_t threads_;
   std::size_t samples_ = 0;
@@ -489,10 +484,10 @@ NoiseVector along_ridge(const Eigen::MatrixXd& curvature, Eigen::Index i) {
 }  // namespace
 
 NoiseInterval noise_interval(const MotionModel& model, const std::vector<const TrackView*>& tracks,
-                             bool has_headings, std::uint32_t threads) {
+                             const NoiseRestriction& columns, bool has_headings, std::uint32_t threads) {
   const std::vector<Path> paths = paths_of(model, tracks, threads);
-  const Biases biases = biases_of(model, paths);
-  const Climb climb(paths, &biases, has_headings, threads);
+  const Estimated estimated{biases_of(model, paths), columns};
+  const Climb climb(paths, &estimated, has_headings, threads);
   NoiseVector best = logs_of(model.noise);
   climb(best, climb.from_afar());
   const Eigen::MatrixXd curvature = climb.curvature(best);
@@ -508,7 +503,7 @@ NoiseInterval noise_interval(const MotionModel& model, const std::vector<const T
     without[i] = found;
   }
   without = (value - without.array()).matrix();
-  best = logs_of(with(model.noise, variances(best)));
+  best = logs_of(with_fitted(model.noise, variances(best)));
   NoiseVector low = NoiseVector::Constant(NAN), high = low;
   for (Eigen::Index i = 0; i < climb.size(); ++i) {
     const NoiseVector ridge = along_ridge(curvature, i);
@@ -525,7 +520,7 @@ NoiseInterval noise_interval(const MotionModel& model, const std::vector<const T
   }
   Noise unknown;
   unknown.wall_mm2_s = unknown.wall_rad2_s = unknown.contact_mm2_s = unknown.contact_rad2_s = NAN;
-  return {with(unknown, low), with(unknown, high), with(model.noise, variances(best))};
+  return {with_fitted(unknown, low), with_fitted(unknown, high), with_fitted(model.noise, variances(best))};
 }
 
 Noise most_likely_noise(const MotionModel& start, const std::vector<const TrackView*>& tracks, bool has_headings,
@@ -549,7 +544,7 @@ Noise most_likely_noise(const MotionModel& start, const std::vector<const TrackV
       restart[kPosition] = std::max(at[kPosition], std::log(0.1));
       if (climb(restart, climb.from_afar()) > value) at = restart;
     }
-    model.noise = with(model.noise, variances(at));
+    model.noise = with_fitted(model.noise, variances(at));
     if ((at - before).cwiseAbs().maxCoeff() < kSettled) break;
   }
   return model.noise;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "clients/identify/fit/filter_pass.hpp"
+#include "clients/identify/fit/noise_restriction.hpp"
 
 namespace kilotwin::identify {
 
@@ -20,9 +21,10 @@ struct NoiseInterval {
   Noise most_likely;
 };
 
-/// 95 % intervals by profile likelihood. The likelihood is integrated over the biases, which the fit adapts to the noise. A variance
-/// that may as well be 0 has the end 0.
+/// 95 % intervals by profile likelihood. The likelihood is integrated over the biases and the other columns, which the fit adapts to
+/// the noise. A variance that may as well be 0 has the end 0.
 [[nodiscard]] NoiseInterval noise_interval(const MotionModel&, const std::vector<const TrackView*>& tracks,
-                                           bool has_headings, std::uint32_t threads);
+                                           const NoiseRestriction& columns, bool has_headings,
+                                           std::uint32_t threads);
 
 }  // namespace kilotwin::identify

@@ -137,7 +137,10 @@ Encounters PreparedSet::encounters() const {
   Encounters sum;
   constexpr double kEvery_s = 1;
   for (const TrackView& view : views_) {
-    for (double t = view.track->samples.front().time_s; t < view.track->samples.back().time_s; t += kEvery_s) {
+    const double first_s = view.track->samples.front().time_s;
+    const auto instants = static_cast<int>(std::ceil((view.track->samples.back().time_s - first_s) / kEvery_s));
+    for (int i = 0; i < instants; ++i) {
+      const double t = first_s + i * kEvery_s;
       const double nearest = view.neighbours->view(view.place, t).nearest_mm;
       if (nearest < Encounters::kInside_mm) ++sum.within;
       if (nearest > kContactRange_mm && nearest < Encounters::kRing_mm) ++sum.near;

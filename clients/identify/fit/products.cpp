@@ -148,8 +148,8 @@ NeededProducts::NeededProducts(Eigen::Index n, const std::vector<std::vector<Eig
   Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> with =
       Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic>::Constant(panels, panels, false);
   for (const std::vector<Eigen::Index>& group : groups) {
-    std::vector<Eigen::Index> own;
-    for (const Eigen::Index column : group) own.push_back(column / kPanel);
+    std::vector<Eigen::Index> own(group.size());
+    std::transform(group.begin(), group.end(), own.begin(), [](Eigen::Index column) { return column / kPanel; });
     std::sort(own.begin(), own.end());
     own.erase(std::unique(own.begin(), own.end()), own.end());
     for (const Eigen::Index a : own)

@@ -80,8 +80,8 @@ ValueWithSd TermValues::at(const std::vector<BlockPlace>& places) const {
     const Basis& basis = term_.blocks[place.block].basis;
     for (const Change& change : changes_) {
       if (change.of != place.block) continue;
-      slopes.tail(slopes.size() - coefficients).noalias() +=
-          change.weights.transpose() * columns_at(*change.basis, basis, place.factors);
+      const Eigen::VectorXd changed = change.weights.transpose() * columns_at(*change.basis, basis, place.factors);
+      slopes.tail(changed.size()) += changed;
     }
   }
   return {value, std::sqrt(std::max(0.0, slopes.dot(covariance_ * slopes)))};

@@ -115,7 +115,7 @@ Situation TrackFilter::situation(double time_s, const Eigen::Vector3d& pose, con
 }
 
 StepRecord TrackFilter::step(double time_s, double h_s, const CommandState& commands, const NeighbourView& near) {
-  const StepRecord record = step_freely(time_s, h_s, commands, near);
+  StepRecord record = step_freely(time_s, h_s, commands, near);
   apply_walls();
   return record;
 }

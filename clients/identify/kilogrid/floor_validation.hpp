@@ -1,6 +1,7 @@
 /// Validation on held-out runs: cell predictions, and the classifier two-sample test.
 #pragma once
 
+#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>

@@ -153,6 +153,13 @@ void add_pairs_of_drifts(DictionaryBuilder& make, const Extent& extent) {
   if (commands) add_pair(make, kSlip, robot_part(extent), command_part(extent));
 }
 
+/// What the camera shows of single robots, as of their markers, and of places.
+void add_pairs_of_sight(DictionaryBuilder& make, const Extent& extent) {
+  add_pair(make, kCamera, place_part(extent, 2), heading_part(2));
+  add_pair(make, kCamera, place_part(extent, 3), time_part(extent, 4));
+  if (extent.robots.size() >= 2) add_pair(make, kCamera, robot_part(extent), heading_part(2));
+}
+
 void add_pairs_with_neighbours(DictionaryBuilder& make, const Extent& extent) {
   if (!extent.neighbours) return;
   Factor around = over(Shape::kHarmonics, Covariate::kBearing, 0, 1, 3);
@@ -177,7 +184,7 @@ void add_pairs_with_neighbours(DictionaryBuilder& make, const Extent& extent) {
 std::vector<Dictionary> general_dictionaries_of(const Extent& extent) {
   std::vector<Dictionary> all;
   for (const auto add : {add_maps_over_time, add_drifts_over_time, add_pairs_with_robots, add_courses_of_runs,
-                         add_other_pairs, add_pairs_of_drifts, add_pairs_with_neighbours}) {
+                         add_other_pairs, add_pairs_of_drifts, add_pairs_of_sight, add_pairs_with_neighbours}) {
     Dictionary dictionary;
     DictionaryBuilder make(dictionary);
     add(make, extent);

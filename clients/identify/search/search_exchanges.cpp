@@ -16,6 +16,10 @@ constexpr double kManyChoices = 2.5;
 constexpr double kMostByShape = 200, kAsGood = 10;
 /// Hypotheses with this share of the best evidence are kept as alternatives: the order may change after shape refinement.
 constexpr double kAlternativeShare = 0.97;
+/// Others with this share of a term's evidence, and no more than so many, are fitted in its place: about another model, the linear
+/// evidence errs by some per cent.
+constexpr double kContenderShare = 0.9;
+constexpr std::size_t kMostContenders = 2;
 
 }  // namespace
 
@@ -31,7 +35,7 @@ bool SearchLoop::eliminate() {
 }
 
 bool SearchLoop::exchanged(std::size_t place, const Finding& own) {
-  const std::string& name = out_.fit.model.terms[place].name;
+  const std::string name = out_.fit.model.terms[place].name;  // the term may change below
   std::vector<const Hypothesis*> others;
   for (const Hypothesis& h : dictionary_.hypotheses) {
     if (h.log_choices > kManyChoices && h.name != name) continue;
@@ -39,17 +43,27 @@ bool SearchLoop::exchanged(std::size_t place, const Finding& own) {
     if (!multiplies_term(out_.fit.model, dictionary_.term_of(h, 1))) others.push_back(&h);
   }
   const std::vector<Finding> findings = score_test_->evidence_of_each(others, static_cast<int>(place));
-  const Hypothesis* best = nullptr;
-  Finding best_finding;
+  std::map<std::string, Contender> contenders;  // the best hypothesis of each name
   for (std::size_t h = 0; h < others.size(); ++h) {
-    if (best != nullptr && !(findings[h].evidence > best_finding.evidence)) continue;
-    best = others[h];
-    best_finding = findings[h];
+    Contender& most = contenders.try_emplace(others[h]->name, Contender{others[h], findings[h]}).first->second;
+    if (findings[h].evidence > most.finding.evidence) most = {others[h], findings[h]};
   }
-  return best != nullptr && best->name != name &&
-         best_finding.evidence > own.evidence + std::max(kClose, kRemnant * own.evidence) &&
-         !failed_.contains({Attempt::Kind::kExchange, {best->name, name}}) &&
-         exchanged_for(place, *best, best_finding);
+  std::vector<Contender> best;
+  for (const auto& [other, contender] : contenders)
+    if (other != name && contender.finding.evidence > kContenderShare * own.evidence) best.push_back(contender);
+  std::sort(best.begin(), best.end(),
+            [](const Contender& a, const Contender& b) { return a.finding.evidence > b.finding.evidence; });
+  if (best.size() > kMostContenders) best.resize(kMostContenders);
+  const auto of_name = contenders.find(name);
+  const double clear = std::max(own.evidence + std::max(kClose, kRemnant * own.evidence),
+                                of_name != contenders.end() ? of_name->second.finding.evidence : 0);
+  for (const Contender& one : best) {
+    const Attempt attempt{Attempt::Kind::kExchange, {one.hypothesis->name, name}};
+    if (failed_.contains(attempt)) continue;
+    if (one.finding.evidence > clear ? exchanged_for(place, one) : fits_better(place, one)) return true;
+    failed_.insert(attempt);
+  }
+  return false;
 }
 
 void SearchLoop::separate_last() {
@@ -62,7 +76,27 @@ void SearchLoop::separate_last() {
   extend_targets(fitter_, out_.fit, last);
 }
 
-bool SearchLoop::exchanged_for(std::size_t place, const Hypothesis& other, Finding finding) {
+void SearchLoop::put(std::size_t place, const Contender& other) {
+  Finding finding = other.finding;
+  finding.log10_p = out_.reasons[place].finding.log10_p;
+  out_.fit.model.terms[place] = dictionary_.term_of(*other.hypothesis, finding.relative_scale);
+  out_.reasons[place] = {other.hypothesis->covariates, other.hypothesis->acts_on, finding,
+                         out_.reasons[place].threshold_log10_p};
+  fitter_.fit_until_settled(out_.fit);
+}
+
+bool SearchLoop::fits_better(std::size_t place, const Contender& other) {
+  const Search before = out_;
+  const double evidence = fitter_.log_evidence(out_.fit);
+  put(place, other);
+  refine_shape(place);
+  fitter_.fit_contacts(out_.fit);
+  if (fitter_.log_evidence(out_.fit) > evidence + kClose) return true;
+  out_ = before;
+  return false;
+}
+
+bool SearchLoop::exchanged_for(std::size_t place, const Contender& other) {
   const Search before = out_;
   // Contacts show whether the robots move or the camera does.
   const auto acts_on_camera = [&] { return is_measured(out_.fit.model.terms[place].blocks.front().target); };
@@ -70,10 +104,7 @@ bool SearchLoop::exchanged_for(std::size_t place, const Hypothesis& other, Findi
   // With the disc centres of the state before.
   const double likelihood = fitter_.log_likelihood(out_.fit),
                likelihood_of_all = fitter_.log_likelihood_of_all(out_.fit);
-  finding.log10_p = out_.reasons[place].finding.log10_p;
-  out_.fit.model.terms[place] = dictionary_.term_of(other, finding.relative_scale);
-  out_.reasons[place] = {other.covariates, other.acts_on, finding, out_.reasons[place].threshold_log10_p};
-  fitter_.fit(out_.fit, 2);
+  put(place, other);
   if (was_on_camera != acts_on_camera()) {
     refine_shape(place);
     fitter_.fit_contacts(out_.fit);
@@ -86,7 +117,6 @@ bool SearchLoop::exchanged_for(std::size_t place, const Hypothesis& other, Findi
     }
   }
   out_ = before;
-  failed_.insert({Attempt::Kind::kExchange, {other.name, out_.fit.model.terms[place].name}});
   return false;
 }
 
@@ -114,7 +144,7 @@ void SearchLoop::try_camera_motion() {
   if (best == nullptr || (!at_rest && best_finding.evidence <
                                           kAlike * score_test_->evidence_of_term(static_cast<int>(place)).evidence))
     return;
-  exchanged_for(place, *best, best_finding);
+  exchanged_for(place, {best, best_finding});
 }
 
 bool SearchLoop::is_constant_of(const Term& term, const Term& other) {

@@ -163,14 +163,25 @@ class SearchLoop {
   /// Backward elimination and exchange. Returns whether a term was removed or replaced, so that the search must
   /// continue.
   bool eliminate();
-  /// Exchanges a term, whose evidence is `own`, for the hypothesis with the most evidence in its place, if that is clearly larger.
+  /// A hypothesis in place of a term.
+  struct Contender {
+    const Hypothesis* hypothesis;
+    Finding finding;
+  };
+  /// Exchanges a term, whose evidence is `own`, for a hypothesis with clearly more evidence in its place, or for one with about as much
+  /// that fits better.
   bool exchanged(std::size_t place, const Finding& own);
   /// Replaces the last term, of two covariates, by a product of two functions: its columns leave residuals that would pass the tests as one
   /// further term after another. First, another hypothesis may replace it: a product can resemble much.
   void separate_last();
+  /// Puts a hypothesis in place of a term, and fits.
+  void put(std::size_t place, const Contender& other);
   /// Exchanges a term for another hypothesis. The quadratic approximation may overestimate its evidence: restores
   /// the state if the likelihood falls.
-  bool exchanged_for(std::size_t place, const Hypothesis& other, Finding finding);
+  bool exchanged_for(std::size_t place, const Contender& other);
+  /// The same if the evidence of the fitted model, with its shape refined and contacts refitted, is clearly larger; restores the state
+  /// otherwise.
+  bool fits_better(std::size_t place, const Contender& other);
   /// Tests camera motion against a drift of the robots. Robots at rest and walls separate the two.
   void try_camera_motion();
   /// Whether a term is the constant part of another one.

@@ -109,6 +109,8 @@ void add_heading_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   make.curve(kSpeed, "heading", {"heading"}, round, {2, 4, 8}, false);
   make.curve(kTurning, "heading", {"heading"}, round, {2, 4, 8}, false);
   make.curve(kSlip, "heading", {"heading"}, round, {2, 4}, false);
+  // A tall marker that is lit from one side, or one that is not round.
+  make.curve(kCamera, "heading", {"heading"}, round, {2, 4}, false);
   if (extent.headings)
     add_compass(make, "heading", make.curve(kCompass, "heading", {"heading"}, round, {2, 4}, false), {2, 4});
 }
