@@ -17,8 +17,8 @@ constexpr double kMostByShape = 200, kAsGood = 10;
 /// Hypotheses with this share of the best evidence are kept as alternatives: the order may change after shape refinement.
 constexpr double kAlternativeShare = 0.97;
 /// Others with this share of a term's evidence, and no more than so many, are fitted in its place: about another model, the linear
-/// evidence errs by some per cent.
-constexpr double kContenderShare = 0.9;
+/// evidence errs by up to some 10 %.
+constexpr double kContenderShare = 0.85;
 constexpr std::size_t kMostContenders = 2;
 
 }  // namespace
@@ -85,27 +85,37 @@ void SearchLoop::put(std::size_t place, const Contender& other) {
   fitter_.fit_until_settled(out_.fit);
 }
 
+double SearchLoop::evidence_with_contacts() const {
+  return fitter_.log_evidence(out_.fit) - fitter_.log_likelihood(out_.fit) +
+         fitter_.log_likelihood_of_all(out_.fit);
+}
+
 bool SearchLoop::fits_better(std::size_t place, const Contender& other) {
   const Search before = out_;
-  const double evidence = fitter_.log_evidence(out_.fit);
+  const double evidence = fitter_.log_evidence(out_.fit), with_contacts = evidence_with_contacts();
+  const bool was_on_camera = acts_on_camera(place);
   put(place, other);
   refine_shape(place);
   fitter_.fit_contacts(out_.fit);
-  if (fitter_.log_evidence(out_.fit) > evidence + kClose) return true;
+  if (was_on_camera != acts_on_camera(place) ? evidence_with_contacts() > with_contacts + kClose
+                                             : fitter_.log_evidence(out_.fit) > evidence + kClose)
+    return true;
   out_ = before;
   return false;
 }
 
+bool SearchLoop::acts_on_camera(std::size_t place) const {
+  return is_measured(out_.fit.model.terms[place].blocks.front().target);
+}
+
 bool SearchLoop::exchanged_for(std::size_t place, const Contender& other) {
   const Search before = out_;
-  // Contacts show whether the robots move or the camera does.
-  const auto acts_on_camera = [&] { return is_measured(out_.fit.model.terms[place].blocks.front().target); };
-  const bool was_on_camera = acts_on_camera();
+  const bool was_on_camera = acts_on_camera(place);
   // With the disc centres of the state before.
   const double likelihood = fitter_.log_likelihood(out_.fit),
                likelihood_of_all = fitter_.log_likelihood_of_all(out_.fit);
   put(place, other);
-  if (was_on_camera != acts_on_camera()) {
+  if (was_on_camera != acts_on_camera(place)) {
     refine_shape(place);
     fitter_.fit_contacts(out_.fit);
     if (fitter_.log_likelihood_of_all(out_.fit) > likelihood_of_all - kAsGood) return true;

@@ -182,6 +182,9 @@ class SearchLoop {
   /// The same if the evidence of the fitted model, with its shape refined and contacts refitted, is clearly larger; restores the state
   /// otherwise.
   bool fits_better(std::size_t place, const Contender& other);
+  /// Contacts show whether the robots move or the camera does: measurements after contacts count only where that is the question.
+  [[nodiscard]] bool acts_on_camera(std::size_t place) const;
+  [[nodiscard]] double evidence_with_contacts() const;
   /// Tests camera motion against a drift of the robots. Robots at rest and walls separate the two.
   void try_camera_motion();
   /// Whether a term is the constant part of another one.

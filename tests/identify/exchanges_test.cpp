@@ -1,0 +1,71 @@
+// Which of several look-alikes the search takes, on small scenes: exchanges of terms, and what the camera shows.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <utility>
+
+#include "clients/identify/search/search.hpp"
+#include "tests/identify/small_set.hpp"
+
+namespace kilotwin {
+namespace {
+
+/// An effect on the motion.
+truth::Effect effect(std::function<void(const truth::Situation&, truth::Push&)> push) {
+  truth::Effect out;
+  out.name = "effect";
+  out.push = std::move(push);
+  return out;
+}
+
+/// The only effect that the search finds; no name if there is none, or more.
+std::string found_in(const truth::Scene& scene, std::uint64_t seed) {
+  auto&& [set, fitter, base] = BaseFit(scene, seed);
+  const identify::Search found = identify::search(fitter, base, identify::WorkLog({}));
+  std::string names;
+  for (const identify::Term& term : found.fit.model.terms) names += (names.empty() ? "" : ", ") + term.name;
+  return names;
+}
+
+truth::Scene without_headings(const truth::Effect& one) {
+  truth::Scene scene = small({one});
+  scene.heading = false;
+  scene.robots = 20;
+  scene.train_runs = 3;
+  scene.train_s = 200;
+  return scene;
+}
+
+TEST(Exchanges, ALargeEffectOfACommandIsNoInertia) {
+  // Without headings, the base model of robots whose left turns are slower by 65 % is far off. About it, inertia has more evidence.
+  const truth::Effect slow = effect([](const truth::Situation& at, truth::Push& push) {
+    if (at.motion != truth::Motion::kLeft) return;
+    push.gain.left *= 0.35;
+    push.gain.right *= 0.35;
+  });
+  EXPECT_EQ(found_in(without_headings(slow), 5), "speed-by-command");
+}
+
+TEST(Exchanges, RobotsThatSlipHaveNoMarkersBesideTheirMiddles) {
+  // A slip to the left and a marker that is not in the middle look alike to the linear test.
+  const truth::Effect slip = effect([](const truth::Situation& at, truth::Push& push) {
+    if (at.driven() && at.robot % 5 < 2) push.slip_mm_s.y -= 2.8;
+  });
+  EXPECT_EQ(found_in(without_headings(slip), 5), "slip-by-robot");
+}
+
+TEST(Camera, ShiftsByTheHeadingAreNamed) {
+  // The marker is lit from one side and seen elsewhere, by what it shows to the light.
+  truth::Effect lit;
+  lit.name = "lit marker";
+  lit.see = [](const truth::Situation& at, truth::View& view) {
+    view.point.x += 10 * (0.5 + 0.5 * std::cos(2 * at.heading_rad));
+  };
+  EXPECT_EQ(found_in(small({lit}), 5), "camera-by-heading");
+}
+
+}  // namespace
+}  // namespace kilotwin
