@@ -2,10 +2,12 @@
 // the noise, of the lag, of curves and maps.
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "clients/identify/bands.hpp"
+#include "clients/identify/fit/noise_restriction.hpp"
 #include "clients/identify/model/effect_records.hpp"
 #include "clients/identify/model/effect_text.hpp"
 #include "clients/identify/model/model_file.hpp"
@@ -207,6 +209,36 @@ FitState with_term(const Fitted& f, const std::string& name, const std::string& 
   state.model.terms.push_back(all.term_of(*h, 1));
   f.fitter.fit(state, 2);
   return state;
+}
+
+double log_determinant(const Eigen::MatrixXd& information) {
+  const Eigen::LDLT<Eigen::MatrixXd> parts(information);
+  return parts.vectorD().array().log().sum();
+}
+
+TEST(NoiseRestriction, FollowsTheInformationOfTheColumns) {
+  const Fitted f(small({truth::battery_by_the_clock()}));
+  const FitState state = with_term(f, "speed-by-position", "map");
+  const NoiseRestriction restriction = noise_restriction(f.fitter, state, 1);
+  const FittedVariances at = fitted_variances(state.model.noise);
+  const auto exact = [&](const FittedVariances& variances) {
+    FitState other = state;
+    other.model.noise = with_fitted(other.model.noise, variances);
+    return -0.5 * log_determinant(f.fitter.information(other));
+  };
+  // At most all columns, and fewer than there are, because priors hold some.
+  EXPECT_GT(restriction.columns, 5);
+  EXPECT_LT(restriction.columns, static_cast<double>(kBaseColumns + state.model.terms.back().coefficients.size()));
+  FittedVariances more_factor = at, less_factor = at, more_of_tracker = at;
+  more_factor[fitted_variance::kFactor] *= 3;
+  less_factor[fitted_variance::kFactor] /= 3;
+  more_of_tracker[fitted_variance::kPosition] *= 2;
+  for (const FittedVariances& other : {more_factor, less_factor, more_of_tracker, FittedVariances(0.6 * at)}) {
+    const double expected = exact(other) - exact(at);
+    EXPECT_NEAR(restriction(other) - restriction(at), expected, 0.3 + 0.15 * std::abs(expected));
+  }
+  // Half of the samples follow half of the noise that the columns do.
+  EXPECT_DOUBLE_EQ(noise_restriction(f.fitter, state, 0.5).columns, restriction.columns / 2);
 }
 
 TEST(Bands, OfACurveStandAtItsPoints) {

@@ -126,7 +126,10 @@ std::optional<ContactDistance> contact_distance(const std::vector<RobotPair>& pa
     double edge_mm, value;
   };
   std::vector<Tried> tried;
-  for (double edge = kLow_mm + 3; edge < kHigh_mm - 6; edge += kBin_mm) {
+  constexpr double kFirst_mm = kLow_mm + 3, kLast_mm = kHigh_mm - 6;
+  const auto edges = static_cast<int>(std::ceil((kLast_mm - kFirst_mm) / kBin_mm));
+  for (int i = 0; i < edges; ++i) {
+    const double edge = kFirst_mm + i * kBin_mm;
     double best = -1e300;
     for (const double sd : {0.3, 0.5, 0.8, 1.2, 1.8, 2.7}) {
       const Shares shares(edge, sd);
@@ -194,8 +197,8 @@ Walls carried(const Walls& walls, const MotionModel& before, const MotionModel& 
     if (std::isfinite(high)) return std::pair{high - 2 * kSide_mm, high};
     return std::pair{-kSide_mm, kSide_mm};
   };
-  const auto [x_low, x_high] = range(walls.x_low_mm, walls.x_high_mm);
-  const auto [y_low, y_high] = range(walls.y_low_mm, walls.y_high_mm);
+  const std::pair<double, double> in_x = range(walls.x_low_mm, walls.x_high_mm),
+                                  in_y = range(walls.y_low_mm, walls.y_high_mm);
   // Compares disc centres, whichever point of the robot is tracked.
   const auto of_centres = [](MotionModel model) {
     model.base.ahead_mm = model.base.centre_mm = model.base.left_mm = 0;
@@ -212,7 +215,8 @@ Walls carried(const Walls& walls, const MotionModel& before, const MotionModel& 
     if (std::isinf(walls.*side)) return;
     double sum = 0;
     for (const double part : kAlong) {
-      const double along = of_x ? y_low + part * (y_high - y_low) : x_low + part * (x_high - x_low);
+      const auto& [low, high] = of_x ? in_y : in_x;
+      const double along = low + part * (high - low);
       sum += of_x ? moved(walls.*side, along)[0] : moved(along, walls.*side)[1];
     }
     out.*side = sum / static_cast<double>(kAlong.size());

@@ -235,7 +235,7 @@ Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) 
     case Shape::kExponential:
     case Shape::kLevelling: set_exponential(function, factor, coefficients); break;
     case Shape::kWave: set_harmonic(function, coefficients[0], coefficients[1], factor.points[0]); break;
-    case Shape::kTravelling: break;  // a sum of products
+    case Shape::kTravelling:         // a sum of products
     case Shape::kPointShift: break;  // part of a fit, of no model
     case Shape::kGrid:
       set_map(function, factor, factor.count, factor.points.size() / factor.count,

@@ -135,6 +135,7 @@ std::string of_curve(const std::vector<double>& at, const std::vector<double>& v
   places.push_back(value.size() - 1);
   std::sort(places.begin(), places.end());
   std::vector<std::string> parts;
+  parts.reserve(places.size());
   for (const std::size_t i : places)
     parts.push_back(fmt::format("{} at {}", signed_size(value[i], target), place(at[i], f)));
   return fmt::format("{}", fmt::join(parts, ", "));
@@ -200,6 +201,7 @@ std::string amplitudes_in_words(const Function& f) {
     const proto::Table& table = f.table();
     if (f.of() == Function::COMMAND) {
       std::vector<std::string> parts;
+      parts.reserve(static_cast<std::size_t>(table.value_size()));
       for (int i = 0; i < table.value_size(); ++i)
         parts.push_back(fmt::format("{:.2f} {}", table.value(i), command_name(table.key(i))));
       return fmt::format("times {}", fmt::join(parts, ", "));

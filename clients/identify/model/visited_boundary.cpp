@@ -42,6 +42,7 @@ VisitedBoundary::VisitedBoundary(const MeasuredSet& set, double margin_mm)
             out[static_cast<std::size_t>(at)].push_back(side.sign * (side.of_x ? s.x_mm : s.y_mm));
         }
     std::vector<double> farthest;
+    farthest.reserve(out.size());
     for (std::vector<double>& strip : out)
       farthest.push_back(strip.empty() ? 0 : near_the_end(strip, 2, kOutliers));
     // Where the boundary is inclined, the quantile is that at the outer end of a strip: corrects by half of the

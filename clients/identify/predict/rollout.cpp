@@ -24,11 +24,12 @@ class Normals {
     Eigen::Matrix<double, n, 1> out;
     for (int i = 0; i < n; i += 4) {
       const auto word = philox4x32({sample, robot, step, static_cast<std::uint32_t>(i)}, key_);
-      for (int pair = 0; pair < 2; ++pair) {
-        const double radius = std::sqrt(-2 * std::log((word[static_cast<std::size_t>(2 * pair)] + 0.5) * 0x1p-32));
-        const double angle = 2 * M_PI * word[static_cast<std::size_t>(2 * pair + 1)] * 0x1p-32;
-        if (i + 2 * pair < n) out[i + 2 * pair] = radius * std::cos(angle);
-        if (i + 2 * pair + 1 < n) out[i + 2 * pair + 1] = radius * std::sin(angle);
+      for (const int first : {0, 2}) {
+        const auto at = static_cast<std::size_t>(first);
+        const double radius = std::sqrt(-2 * std::log((word[at] + 0.5) * 0x1p-32));
+        const double angle = 2 * M_PI * word[at + 1] * 0x1p-32;
+        if (i + first < n) out[i + first] = radius * std::cos(angle);
+        if (i + first + 1 < n) out[i + first + 1] = radius * std::sin(angle);
       }
     }
     return out;

@@ -193,11 +193,12 @@ double Fit::find_mode(bool spreads) {
     const VectorXd full = right - half.cwiseProduct(root.solve(half.cwiseProduct(covariance * right)));
     const VectorXd from = dual_;
     double length = 1, objective = best;
-    for (; length > 1e-3; length /= 2) {
+    while (length > 1e-3) {
       dual_ = from + length * (full - from);
       margin_ = offset + covariance * dual_;
       objective = evaluate(margin_);
       if (objective >= best) break;
+      length /= 2;
     }
     const double gain = objective - best;
     best = objective;
@@ -312,7 +313,8 @@ LinkModel Fit::run() {
   std::size_t next = 1;
   if (terms_ >= Terms::kPattern) {
     model.pattern_db.assign(effects[next].data(), effects[next].data() + effects[next].size());
-    for (std::size_t n = 0; n < model.pattern_db.size(); ++n) model.pattern_db[n] /= static_cast<double>(n / 2 + 1);
+    for (std::size_t n = 0; n < model.pattern_db.size(); ++n)
+      model.pattern_db[n] /= static_cast<double>(harmonic_of(n));
     ++next;
   }
   const std::size_t placement = next;
@@ -323,7 +325,7 @@ LinkModel Fit::run() {
     swarm.pattern_db = model.pattern_db;
     for (std::size_t n = 0; n < swarm.pattern_db.size() && terms_ >= Terms::kPlacement; ++n)
       swarm.pattern_db[n] += effects[placement](static_cast<Eigen::Index>(q * swarm.pattern_db.size() + n)) /
-                             static_cast<double>(n / 2 + 1);
+                             static_cast<double>(harmonic_of(n));
   }
   add_links(model, next + 4);
   if (terms_ >= Terms::kRobots) {

@@ -15,6 +15,9 @@ namespace kilotwin::radio_fit {
 /// Nested models: each includes the previous terms.
 enum class Terms { kDistance, kPattern, kPlacement, kBodies, kRobots, kBearings, kPairs };
 
+/// The harmonic of a number of a pattern a1 b1 a2 b2..
+[[nodiscard]] constexpr std::size_t harmonic_of(std::size_t number) { return number / 2 + 1; }
+
 struct LinkModel {
   Terms terms = Terms::kDistance;
   double range_mm = 130;

@@ -399,7 +399,8 @@ void Loop::draw_population() {
   for (std::size_t q = 0; q < train_.size(); ++q) {
     const proto::Radio radio = model_.population(model_.swarms[q], drawn());
     const Statistics real = statistics(test_[q]);
-    std::vector<std::vector<double>> drawn = reception_of_swarms(q, [&](int) { return radio; });
+    std::vector<std::vector<double>> drawn =
+        reception_of_swarms(q, [&](int) -> const proto::Radio& { return radio; });
     for (std::size_t c = 0; c < drawn.size(); ++c) {
       const auto at = [&](double share) { return stats::nearest_quantile(drawn[c], share); };
       const DisplacementClass& is = real.classes[c];
@@ -558,7 +559,7 @@ void Loop::write_placements() const {
     std::vector<double> pattern_db = model_.pattern_db;
     for (std::size_t n = 0; n < pattern_db.size(); ++n)
       pattern_db[n] +=
-          model_.laying_sd_db / static_cast<double>(n / 2 + 1) *
+          model_.laying_sd_db / static_cast<double>(harmonic_of(n)) *
           random.normal(Stream::kLink, static_cast<std::uint32_t>(k), Tick{0}, static_cast<std::uint32_t>(n));
     return with_pattern(pattern_db);
   };
@@ -569,7 +570,7 @@ void Loop::write_placements() const {
   for (std::size_t q = 0; q < train_.size(); ++q) {
     const std::vector<DisplacementClass> real = statistics(test_[q]).classes;
     const std::vector<std::vector<double>> as[] = {
-        reception_of_swarms(q, [&](int) { return population; }),
+        reception_of_swarms(q, [&](int) -> const proto::Radio& { return population; }),
         reception_of_swarms(q, [&](int) { return with_pattern(model_.pattern_db); }),
         reception_of_swarms(q, drawn_placement)};
     for (std::size_t c = 0, end = 0; c < real.size() && real[c].distance_mm <= kNeverHeard_mm; c = end) {

@@ -103,8 +103,11 @@ bool TrackStatistics::in_contact(const Sample& from, const Sample& to, const Run
                                  std::size_t place) const {
   for (const Sample* s : {&from, &to})
     if (walls_.at_wall(s->x_mm, s->y_mm, kAtWall_mm + off_centre_mm_)) return true;
-  for (double t = from.time_s; t <= to.time_s; t += RunNeighbours::kRaster_s)
-    if (neighbours.view(place, t).nearest_mm < kContactRange_mm + 2 * off_centre_mm_) return true;
+  const auto later = static_cast<int>((to.time_s - from.time_s) / RunNeighbours::kRaster_s);
+  for (int i = 0; i <= later; ++i)
+    if (neighbours.view(place, from.time_s + i * RunNeighbours::kRaster_s).nearest_mm <
+        kContactRange_mm + 2 * off_centre_mm_)
+      return true;
   return false;
 }
 

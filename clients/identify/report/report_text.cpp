@@ -39,6 +39,7 @@ std::string superscript(int value) {
 
 std::vector<std::string> escaped(const std::vector<std::string>& texts) {
   std::vector<std::string> out;
+  out.reserve(texts.size());
   for (const std::string& text : texts) out.push_back(html::escaped(text));
   return out;
 }
