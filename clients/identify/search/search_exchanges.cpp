@@ -20,6 +20,9 @@ constexpr double kAlternativeShare = 0.97;
 /// evidence errs by up to some 10 %.
 constexpr double kContenderShare = 0.85;
 constexpr std::size_t kMostContenders = 2;
+/// By how much of a term's evidence another one with no fewer columns must fit better, at most by so many nat: less can come from the
+/// forms of both.
+constexpr double kClearlyBetter = 0.02, kMostBetter = 50;
 
 }  // namespace
 
@@ -60,7 +63,10 @@ bool SearchLoop::exchanged(std::size_t place, const Finding& own) {
   for (const Contender& one : best) {
     const Attempt attempt{Attempt::Kind::kExchange, {one.hypothesis->name, name}};
     if (failed_.contains(attempt)) continue;
-    if (one.finding.evidence > clear ? exchanged_for(place, one) : fits_better(place, one)) return true;
+    const bool simpler =
+        static_cast<Eigen::Index>(one.hypothesis->columns.size()) < out_.fit.model.terms[place].coefficients.size();
+    const double margin = simpler ? kClose : std::clamp(kClearlyBetter * own.evidence, kClose, kMostBetter);
+    if (one.finding.evidence > clear ? exchanged_for(place, one) : fits_better(place, one, margin)) return true;
     failed_.insert(attempt);
   }
   return false;
@@ -90,17 +96,31 @@ double SearchLoop::evidence_with_contacts() const {
          fitter_.log_likelihood_of_all(out_.fit);
 }
 
-bool SearchLoop::fits_better(std::size_t place, const Contender& other) {
-  const Search before = out_;
-  const double evidence = fitter_.log_evidence(out_.fit), with_contacts = evidence_with_contacts();
-  const bool was_on_camera = acts_on_camera(place);
-  put(place, other);
+void SearchLoop::settle(std::size_t place) {
   refine_shape(place);
   fitter_.fit_contacts(out_.fit);
-  if (was_on_camera != acts_on_camera(place) ? evidence_with_contacts() > with_contacts + kClose
-                                             : fitter_.log_evidence(out_.fit) > evidence + kClose)
+  fitter_.fit_until_settled(out_.fit);
+}
+
+bool SearchLoop::fits_better(std::size_t place, const Contender& other, double margin) {
+  const Search before = out_;
+  const bool was_on_camera = acts_on_camera(place);
+  put(place, other);
+  const bool counts_contacts = was_on_camera != acts_on_camera(place);
+  const auto evidence = [&] { return counts_contacts ? evidence_with_contacts() : fitter_.log_evidence(out_.fit); };
+  settle(place);
+  const double of_other = evidence();
+  Search contender = std::exchange(out_, before);
+  const double own = evidence();
+  if (of_other < own + margin) return false;
+  // The term may be far from its own maximum.
+  settle(place);
+  const double own_settled = evidence();
+  if (of_other > own_settled + margin) {
+    out_ = std::move(contender);
     return true;
-  out_ = before;
+  }
+  if (own_settled < own) out_ = before;
   return false;
 }
 

@@ -179,9 +179,11 @@ class SearchLoop {
   /// Exchanges a term for another hypothesis. The quadratic approximation may overestimate its evidence: restores
   /// the state if the likelihood falls.
   bool exchanged_for(std::size_t place, const Contender& other);
-  /// The same if the evidence of the fitted model, with its shape refined and contacts refitted, is clearly larger; restores the state
-  /// otherwise.
-  bool fits_better(std::size_t place, const Contender& other);
+  /// The same if the evidence of the settled model is larger by `margin` than that of the present one, settled too. Otherwise the term
+  /// stays.
+  bool fits_better(std::size_t place, const Contender& other, double margin);
+  /// Refines the shape of a term, and fits everything until it settles.
+  void settle(std::size_t place);
   /// Contacts show whether the robots move or the camera does: measurements after contacts count only where that is the question.
   [[nodiscard]] bool acts_on_camera(std::size_t place) const;
   [[nodiscard]] double evidence_with_contacts() const;
