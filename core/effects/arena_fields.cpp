@@ -80,8 +80,9 @@ std::int64_t ArenaFields::index_of(const Field& field, std::uint32_t cell) {
 }
 
 bool ArenaFields::is_own(const Field& field, std::uint32_t cell) const {
-  const double x_mm = field.x0_mm + (cell % field.columns + 0.5) / field.cells_per_mm,
-               y_mm = field.y0_mm + (cell / field.columns + 0.5) / field.cells_per_mm;
+  const std::uint32_t column = cell % field.columns, row = cell / field.columns;
+  const double x_mm = field.x0_mm + (column + 0.5) / field.cells_per_mm,
+               y_mm = field.y0_mm + (row + 0.5) / field.cells_per_mm;
   return plan_.grid.owner(x_mm, y_mm) == partition_;
 }
 

@@ -25,7 +25,7 @@ template <class Sequence, class T> Sequence borrow(const std::vector<T>& values)
 
 // Copies a wire sequence into a vector of T. Returns false if its size is not a multiple of that of T.
 template <class Sequence, class T> bool copy(const Sequence& sequence, std::vector<T>& values) {
-  constexpr std::size_t per_value = sizeof(T) / sizeof(*Sequence::_buffer);
+  constexpr std::size_t value_octets = sizeof(T), per_value = value_octets / sizeof(*Sequence::_buffer);
   if (sequence._length % per_value != 0) return false;
   values.resize(sequence._length / per_value);
   if (sequence._length != 0)

@@ -2,9 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <cstdio>
+#include <charconv>
 #include <cstdlib>
 #include <exception>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -23,11 +24,13 @@ constexpr std::int64_t kPatience = 31;
 
 /// The number in robot-NUMBER.txt, or -1 if the name has another form.
 std::int64_t robot_of(const fs::path& file) {
-  unsigned robot = 0;
-  char rest = 0;
-  return std::sscanf(file.filename().c_str(), "robot-%u.tx%c", &robot, &rest) == 2 && rest == 't'
-             ? std::int64_t{robot}
-             : -1;
+  constexpr std::string_view kBefore = "robot-", kAfter = ".txt";
+  const std::string name = file.filename().string();
+  if (!name.starts_with(kBefore)) return -1;
+  std::uint32_t robot = 0;
+  const char* const last = name.data() + name.size();
+  const auto [end, error] = std::from_chars(name.data() + kBefore.size(), last, robot);
+  return error == std::errc() && std::string_view(end, last) == kAfter ? std::int64_t{robot} : -1;
 }
 
 }  // namespace

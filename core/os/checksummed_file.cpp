@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <system_error>
@@ -81,7 +80,7 @@ std::string read_checksummed(const fs::path& file, const FileKind& kind) {
   };
   errno = 0;
   std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw refuse(fmt::format("cannot be read: {}", std::strerror(errno)));
+  if (!stream) throw refuse(fmt::format("cannot be read: {}", std::generic_category().message(errno)));
   const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
   if (bytes.empty()) throw refuse("is empty");
   if (!bytes.starts_with(kind.magic)) {

@@ -28,7 +28,8 @@ double log10_chi_squared_tail(double x, double degrees) {
     h *= ratio;
     if (std::abs(ratio - 1) < 1e-12) break;
   }
-  return (a * std::log(y) - y - std::lgamma(a) + std::log(h)) / std::log(10.0);
+  int sign = 0;  // std::lgamma() would write it to a global
+  return (a * std::log(y) - y - ::lgamma_r(a, &sign) + std::log(h)) / std::log(10.0);
 }
 
 double student_quantile(double p, double degrees) {

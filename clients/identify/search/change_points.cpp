@@ -30,6 +30,7 @@ Block stepping(const Block& like, const std::vector<double>& points) {
 }
 std::vector<Block> stepping(const std::vector<Block>& kinds, const std::vector<double>& at) {
   std::vector<Block> blocks;
+  blocks.reserve(kinds.size());
   for (const Block& kind : kinds) blocks.push_back(stepping(kind, at));
   return blocks;
 }
@@ -62,12 +63,15 @@ class StepChoice {
     const Eigen::VectorXd score = data_.score(out.columns);
     // Maximises the evidence over a few prior scales.
     out.evidence = -1e300;
-    for (double size = size_; size < 4000 * size_; size *= 3) {
+    double size = size_;
+    while (size < 4000 * size_) {
       const Eigen::VectorXd sd = Eigen::VectorXd::Constant(score.size(), size);
       const double value = log_evidence(information, score, sd);
-      if (value <= out.evidence) continue;
-      out.evidence = value;
-      out.sd = sd;
+      if (!(value <= out.evidence)) {
+        out.evidence = value;
+        out.sd = sd;
+      }
+      size *= 3;
     }
     return out;
   }
@@ -76,7 +80,11 @@ class StepChoice {
     std::pair<std::vector<std::size_t>, double> best{{}, 0};
     std::vector<double> sizes;
     if (picked.points.empty()) {
-      for (double size = size_; size < 4000 * size_; size *= 3) sizes.push_back(size);
+      double size = size_;
+      while (size < 4000 * size_) {
+        sizes.push_back(size);
+        size *= 3;
+      }
     } else {
       sizes = {picked.sd[0]};
     }
@@ -182,7 +190,8 @@ bool put_steps(const Fitter& fitter, FitState& state, std::size_t place, const S
     model.terms.push_back({model.terms[place].name, {}, {}, {}});
     place = model.terms.size() - 1;
   }
-  for (double fine_s = apart_s / 5; fine_s > 0.04; fine_s /= 5) {
+  double fine_s = apart_s / 5;
+  while (fine_s > 0.04) {
     std::vector<double> raster;
     for (const double t : at)
       for (int i = -kSide; i <= kSide; ++i) raster.push_back(t + i * fine_s);
@@ -210,6 +219,7 @@ bool put_steps(const Fitter& fitter, FitState& state, std::size_t place, const S
     std::vector<Eigen::Index> columns;
     for (const Eigen::Index c : best.columns) columns.push_back(l.own + c);
     replace_blocks(model, place, l, stepping(steps.kinds, at), score, columns, best.sd);
+    fine_s /= 5;
   }
   if (!steps.beside) return true;
   const Term own = model.terms.back();
@@ -241,7 +251,7 @@ bool only_rises(const Axis& axis) {
 
 std::string find_change_points(const Fitter& fitter, FitState& state, std::size_t place) {
   const MotionModel& model = state.model;
-  const std::string name = model.terms[place].name;
+  std::string name = model.terms[place].name;
   double duration_s = 0;
   bool product = false;
   std::vector<Block> kinds;
@@ -260,8 +270,11 @@ std::string find_change_points(const Fitter& fitter, FitState& state, std::size_
   }
   std::vector<double> points;
   const double apart_s = std::max(1.0, duration_s / kMostPoints);
-  for (double at = apart_s; at < duration_s - apart_s / 2 && points.size() < kMostPoints; at += apart_s)
+  double at = apart_s;
+  while (at < duration_s - apart_s / 2 && points.size() < kMostPoints) {
     points.push_back(at);
+    at += apart_s;
+  }
   std::vector<Steps> forms = {{kinds, false, {}, 0}};
   if (product) {
     // A curve of a product has a constant, as has a step before all data.

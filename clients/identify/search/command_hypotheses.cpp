@@ -168,7 +168,7 @@ void add_history_hypotheses(DictionaryBuilder& make, const Extent& extent) {
     const Eigen::Index curve = group == &kSlip ? 1 : kCurve;
     const Basis basis = curve > 1 ? Basis{{which, since}} : Basis{{which}};
     const auto driven = make.put(*group, basis), straight = make.put(*group, basis, kStraightOnly);
-    const auto after = [&](std::vector<Eigen::Index> bases, Eigen::Index from, Eigen::Index to) {
+    const auto after = [&](const std::vector<Eigen::Index>& bases, Eigen::Index from, Eigen::Index to) {
       for (const Eigen::Index size :
            curve > 1 ? std::vector<Eigen::Index>{1, curve} : std::vector<Eigen::Index>{1}) {
         std::vector<Eigen::Index> columns;

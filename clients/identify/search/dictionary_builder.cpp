@@ -108,7 +108,7 @@ void DictionaryBuilder::add(const TargetGroup& group, const std::string& of, std
 std::vector<Eigen::Index> DictionaryBuilder::curve(const TargetGroup& group, const std::string& of,
                                                    const std::vector<std::string>& words, const Basis& basis,
                                                    const std::vector<Eigen::Index>& sizes, bool windows) {
-  const auto bases = put(group, basis);
+  auto bases = put(group, basis);
   const auto n = static_cast<Eigen::Index>(basis.size());
   for (const Eigen::Index size : sizes)
     if (size <= n) add(group, of, words, some(bases, 0, size));

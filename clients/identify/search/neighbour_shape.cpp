@@ -43,9 +43,12 @@ std::array<double, kNeighbourRadii_mm.size()> densities(const PreparedSet& set) 
   std::array<std::vector<float>, kNeighbourRadii_mm.size()> all;
   constexpr double kEvery_s = 3;
   for (const TrackView& view : set.views()) {
-    for (double t = view.track->samples.front().time_s; t < view.track->samples.back().time_s; t += kEvery_s)
+    double t = view.track->samples.front().time_s;
+    while (t < view.track->samples.back().time_s) {
       for (std::size_t r = 0; r < all.size(); ++r)
         all[r].push_back(view.neighbours->view(view.place, t).density[r]);
+      t += kEvery_s;
+    }
   }
   std::array<double, kNeighbourRadii_mm.size()> most{};
   for (std::size_t r = 0; r < all.size(); ++r) {
@@ -91,7 +94,8 @@ std::vector<Form> forms_of_speed(const PreparedSet& set, std::uint8_t during) {
   std::vector<Form> forms;
   const auto most = densities(set);
   const auto add = [&](Factor f) { forms.push_back({{Target::kGain, Basis{{std::move(f)}}, during}}); };
-  for (std::uint8_t r = 0; r < kNeighbourRadii_mm.size(); ++r) {
+  constexpr std::uint8_t kCount = kNeighbourRadii_mm.size();
+  for (std::uint8_t r = 0; r < kCount; ++r) {
     Factor table;
     table.shape = Shape::kAtLeast;
     table.axis = {Covariate::kNeighbours, r};
@@ -279,12 +283,15 @@ class Choice {
         if (std::find(chosen.forms.begin(), chosen.forms.end(), f) != chosen.forms.end()) continue;
         const Eigen::MatrixXd information = left(columns_[f], columns_[f]);
         const Eigen::VectorXd own_score = score(columns_[f]);
-        for (double size = 0.004; size < 8; size *= 2) {
+        double size = 0.004;
+        while (size < 8) {
           const double value = log_evidence(information, own_score, size * sd_[f]);
-          if (value <= best) continue;
-          best = value;
-          best_form = f;
-          best_sd = size * sd_[f];
+          if (!(value <= best)) {
+            best = value;
+            best_form = f;
+            best_sd = size * sd_[f];
+          }
+          size *= 2;
         }
       }
       if (best < kLeastEvidence + price) break;

@@ -311,11 +311,15 @@ double choose_smoothness(const Eigen::MatrixXd& information, const Eigen::Vector
         for (const Eigen::Index c : groups[g].columns)
           if (information(c, c) > 0) smallest = std::min(smallest, 1 / std::sqrt(information(c, c)));
         if (smallest == 1e300) continue;
-        for (double size = smallest; size < 3000 * smallest; size *= 4)
+        double size = smallest;
+        while (size < 3000 * smallest) {
           for (const double knee : {1.0, 4.0, 16.0}) try_it(g, {size, knee, 3});
+          size *= 4;
+        }
       }
       if (smoothness[g].size == 0) continue;
-      for (double factor = 3; factor > 1.2; factor = std::sqrt(factor)) {
+      double factor = 3;
+      while (factor > 1.2) {
         bool better = true;
         while (better) {
           const Smoothness was = smoothness[g];
@@ -337,6 +341,7 @@ double choose_smoothness(const Eigen::MatrixXd& information, const Eigen::Vector
             better = try_it(g, trial) || better;
           }
         }
+        factor = std::sqrt(factor);
       }
       Smoothness none = smoothness[g];
       none.size = 0;

@@ -94,10 +94,12 @@ BestForm best_of(const std::vector<SimpleForm>& forms, const ReducedColumns& dat
     const Eigen::VectorXd score = data.score(columns);
     const double top = information.diagonal().maxCoeff();
     if (!(top > 0)) continue;
-    for (double size = 1 / std::sqrt(top); size < 4000 / std::sqrt(top); size *= 3) {
+    double size = 1 / std::sqrt(top);
+    while (size < 4000 / std::sqrt(top)) {
       const Eigen::VectorXd sd = Eigen::VectorXd::Constant(score.size(), size);
       const double evidence = log_evidence(information, score, sd) - one.log_choices - 1;
       if (best.form == nullptr || evidence > best.evidence) best = {&one, evidence, sd, columns};
+      size *= 3;
     }
   }
   return best;
@@ -182,7 +184,8 @@ ChosenInstants choose_instants(const ReducedColumns& data, const std::vector<Swi
                                std::size_t points) {
   ChosenInstants best;
   const double smallest = 1 / std::sqrt(std::max(data.information.diagonal().maxCoeff(), 1e-12));
-  for (double sd = smallest; sd < 4000 * smallest; sd *= 3) {
+  double sd = smallest;
+  while (sd < 4000 * smallest) {
     ChosenInstants trial{{}, sd, 0};
     Eigen::Index next = 0;
     for (const SwitchGroup& group : groups) {
@@ -200,6 +203,7 @@ ChosenInstants choose_instants(const ReducedColumns& data, const std::vector<Swi
       trial.evidence += most;
     }
     if (trial.evidence > best.evidence) best = std::move(trial);
+    sd *= 3;
   }
   return best;
 }

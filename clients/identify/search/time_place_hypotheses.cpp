@@ -28,7 +28,7 @@ std::vector<Eigen::Index> add_time_hypotheses(DictionaryBuilder& make, const Ext
   Basis slipping = smooth(8);
   slipping.factors.front().first = 0;
   make.curve(kSlip, "time", {"time"}, slipping, {2, 4, 8}, false);
-  const auto drift = make.curve(kWorld, "time", {"time"}, smooth(32), {1, 3, 8, 16, 32}, true);
+  auto drift = make.curve(kWorld, "time", {"time"}, smooth(32), {1, 3, 8, 16, 32}, true);
   // The camera may drift, rotate and change its scale, separately or together.
   const auto aside = make.put(kCamera, smooth(16));
   const auto turned = make.put(kCameraPose, smooth(8));
@@ -64,7 +64,7 @@ std::vector<Eigen::Index> add_time_hypotheses(DictionaryBuilder& make, const Ext
 
 std::vector<Eigen::Index> add_place_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   const auto map = [&](const TargetGroup& group, std::uint32_t order) {
-    const auto bases = make.put(group, Basis{{plane(extent, order)}});
+    auto bases = make.put(group, Basis{{plane(extent, order)}});
     for (std::uint32_t o = 1; o <= order; ++o)
       make.add(group, "position", {"position"}, some(bases, 0, (o + 1) * (o + 2) / 2 - 1));
     return bases;
@@ -76,7 +76,7 @@ std::vector<Eigen::Index> add_place_hypotheses(DictionaryBuilder& make, const Ex
   const auto slip = make.put(kSlip, Basis{{slipping}});
   for (const Eigen::Index order : {1, 2, 3})
     make.add(kSlip, "position", {"position"}, some(slip, 0, (order + 1) * (order + 2) / 2));
-  const auto drift = map(kWorld, 5);
+  auto drift = map(kWorld, 5);
   map(kCamera, 5);
   // Lenses and tilts distort most at the border, where cosines are flat: polynomials. Their range may exceed the
   // visited area.

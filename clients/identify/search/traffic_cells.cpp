@@ -26,7 +26,7 @@ class Classes {
     }
   }
   [[nodiscard]] std::size_t of(float value) const {
-    return of_[std::min(static_cast<std::size_t>(value * per_value_ + 0.5F), of_.size() - 1)];
+    return of_[std::min(static_cast<std::size_t>(std::floor(value * per_value_ + 0.5F)), of_.size() - 1)];
   }
 
  private:
@@ -69,7 +69,8 @@ struct RatedCells {
 /// Coordinate ascent with decreasing steps.
 RatedCells climbed(const Visits& visits, RatedCells best, double extent_mm) {
   constexpr double kFinest = 0.004;  // relative to the cell side
-  for (double step = 0.16; step > kFinest; step /= 2) {
+  double step = 0.16;
+  while (step > kFinest) {
     for (bool better = true; better;) {
       better = false;
       // A step in the cell side displaces the outermost cells by that share of their side.
@@ -93,6 +94,7 @@ RatedCells climbed(const Visits& visits, RatedCells best, double extent_mm) {
         }
       }
     }
+    step /= 2;
   }
   // The cell corner nearest to the origin.
   best.cells.x_mm = std::remainder(best.cells.x_mm, best.cells.side_mm);
@@ -115,10 +117,13 @@ GridCells fit_grid_cells(const Fitter& fitter, const FitState& state, const Grid
   constexpr double kSmallest_mm = 14, kLargest_mm = 150;
   constexpr int kCorners = 3;
   std::vector<RatedCells> all{{from, 0}};
-  for (double side = kSmallest_mm; side < kLargest_mm; side *= 1 + 0.3 * side / extent_mm)
+  double side = kSmallest_mm;
+  while (side < kLargest_mm) {
     for (int i = 0; i < kCorners; ++i)
       for (int j = 0; j < kCorners; ++j)
         all.push_back({{side, side * i / kCorners, side * j / kCorners, from.forget_s, from.trail}, 0});
+    side *= 1 + 0.3 * side / extent_mm;
+  }
   os::in_parallel(all.size(), fitter.threads(),
                   [&](std::size_t i) { all[i].value = explained(visits, all[i].cells); });
   std::stable_sort(all.begin(), all.end(),

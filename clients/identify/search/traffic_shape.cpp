@@ -35,12 +35,15 @@ void evaluate(const ReducedColumns& data, const std::vector<Eigen::Index>& colum
   const Eigen::VectorXd score = data.score(columns);
   form.columns = columns;
   form.evidence = -1e300;
-  for (double size = 0.01; size < 6; size *= 2) {
+  double size = 0.01;
+  while (size < 6) {
     const Eigen::VectorXd sd = Eigen::VectorXd::Constant(score.size(), size);
     const double evidence = log_evidence(information, score, sd);
-    if (evidence <= form.evidence) continue;
-    form.evidence = evidence;
-    form.sd = sd;
+    if (!(evidence <= form.evidence)) {
+      form.evidence = evidence;
+      form.sd = sd;
+    }
+    size *= 2;
   }
 }
 
@@ -57,6 +60,7 @@ Form some_steps(const ReducedColumns& data, Eigen::Index first, const Block& ste
     for (std::size_t p = 0; p < points.size(); ++p) {
       if (std::find(chosen.begin(), chosen.end(), p) != chosen.end()) continue;
       std::vector<Eigen::Index> columns;
+      columns.reserve(chosen.size() + 1);
       for (const std::size_t c : chosen) columns.push_back(first + static_cast<Eigen::Index>(c));
       columns.push_back(first + static_cast<Eigen::Index>(p));
       Form trial;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <complex>
+#include <cstdint>
 #include <utility>
 
 #include "clients/identify/search/dictionary_builder.hpp"
@@ -87,7 +88,8 @@ Peak climbed(const std::vector<Point>& points, Peak peak, const Wave& step) {
                phasors(points, peak.wave[2], less_time_of);
   peak.power = power_of(points, at);
   int steps = 0;
-  for (double part = 0.5; part > 0.02; part /= 2) {
+  double part = 0.5;
+  while (part > 0.02) {
     const std::array<Phasors, 3> by{phasors(points, part * step[0], x_of), phasors(points, part * step[1], y_of),
                                     phasors(points, part * step[2], less_time_of)};
     for (bool better = true; better && steps < kMostSteps; ++steps) {
@@ -104,6 +106,7 @@ Peak climbed(const std::vector<Point>& points, Peak peak, const Wave& step) {
         }
       }
     }
+    part /= 2;
   }
   return peak;
 }
@@ -118,12 +121,14 @@ struct Raster {
 Raster raster_of(double width_mm, double height_mm, double duration_s, std::size_t points) {
   const Wave step{kSpacing * 2 * M_PI / std::max(width_mm, 1.0), kSpacing * 2 * M_PI / std::max(height_mm, 1.0),
                   kSpacing * 2 * M_PI / duration_s};
-  for (double longer = 1;; longer *= 1.1) {
+  double longer = 1;
+  while (true) {
     const double across = std::floor(2 * M_PI / (longer * kShortest_mm) / step[0]),
                  up = std::floor(2 * M_PI / (longer * kShortest_mm) / step[1]),
                  steps = std::floor(2 * M_PI / (longer * kShortest_s) / step[2]);
     if ((2 * across + 1) * (up + 1) * (2 * steps + 1) * static_cast<double>(points) <= kMostTerms)
       return {step, static_cast<int>(across), static_cast<int>(up), static_cast<int>(steps)};
+    longer *= 1.1;
   }
 }
 
@@ -154,7 +159,8 @@ class Periodogram {
     std::vector<std::complex<double>> sums(2 * static_cast<std::size_t>(raster_.steps) + 1);
     add_phasor_sums(at, by_, sums);
     for (int w = -raster_.steps; w <= raster_.steps; ++w) {
-      const double power = 0.5 * std::norm(sums[static_cast<std::size_t>(w + raster_.steps)]) / information_;
+      const double power =
+          0.5 * std::norm(sums[static_cast<std::size_t>(std::int64_t{w} + raster_.steps)]) / information_;
       // A wave that stands still is a map; robots and biases absorb what is constant.
       if (w == 0 || power <= best.power) continue;
       best.wave[2] = w * raster_.step[2];
@@ -185,7 +191,8 @@ Factor derivative_of(const Factor& wave, const Basis& basis, const Eigen::Vector
   for (Eigen::Index i = 0; i < coefficients.size(); ++i) {
     const std::size_t column =
         basis.chosen.empty() ? static_cast<std::size_t>(i) : basis.chosen[static_cast<std::size_t>(i)];
-    const double k = wave.first + static_cast<double>(column / 2);
+    const std::size_t harmonic = column / 2;
+    const double k = wave.first + static_cast<double>(harmonic);
     // cos(k p) has the derivative -k sin(k p), sin(k p) has k cos(k p).
     if (column % 2 == 0)
       slope.known[column + 1] -= k * coefficients[i];
@@ -224,6 +231,7 @@ bool refine_wave_numbers(const Fitter& fitter, FitState& state, std::size_t plac
     const Block& block = term.blocks.front();
     const Factor slope = derivative_of(block.basis.factors.front(), block.basis, term.coefficients);
     std::vector<Block> blocks;
+    blocks.reserve(along.size());
     for (const Factor& covariate : along) blocks.push_back({block.target, Basis{{covariate, slope}}, block.during});
     return blocks;
   };

@@ -18,6 +18,7 @@ class Bins {
  public:
   Bins(const std::vector<Window>& windows, Feature feature, std::size_t most) : feature_(feature) {
     std::vector<double> all;
+    all.reserve(windows.size());
     for (const Window& w : windows) all.push_back(w[feature]);
     std::sort(all.begin(), all.end());
     std::vector<double> values = all;

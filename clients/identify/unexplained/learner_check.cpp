@@ -113,6 +113,7 @@ std::optional<LearnerCheck> learner_check(const MeasuredSet& set, const std::vec
   StretchBounds taken{bounds->before, bounds->less_by};
   if (!cross_validated && stretches.same_robots && robots_are_known(known, held_out)) {
     std::vector<Stretch> drawn;
+    drawn.reserve(by_time.size());
     for (const auto& [when, stretch] : by_time) drawn.push_back(stretch);
     taken = bounds_of(drawn).value_or(taken);
   }
