@@ -158,6 +158,7 @@ void Covariates::fill(Tick now, const RobotColumns& robots, std::span<const std:
   if (radius_mm_ > 0) fill_neighbours(robots, who);
 }
 
+// NOLINTNEXTLINE(readability-function-size): a switch over many cases
 void Covariates::fill(Column& column, Tick now, const RobotColumns& robots, std::span<const std::uint32_t> who,
                       const ArenaFields* fields) const {
   double* const to = column.values.data();

@@ -1,4 +1,4 @@
-// Which of several look-alikes the search takes, on small scenes: exchanges of terms, and what the camera shows.
+// Look-alikes, on small scenes: the one that the search takes, by exchanges of terms; errors of the camera.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -38,7 +38,7 @@ class Fitter {
   void fit(FitState&, int passes) const;
   /// The same. Returns the log_likelihood() of the result, which the last step knows in most cases.
   double fit_for_likelihood(FitState&, int passes) const;
-  /// The same until the likelihood hardly rises: for a new term, which may change everything.
+  /// The same until the likelihood hardly rises: for a term in place of another, which may change everything.
   void fit_until_settled(FitState&) const;
   /// Refits the noise, on a subset of the tracks.
   void fit_noise(FitState&) const;

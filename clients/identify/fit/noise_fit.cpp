@@ -239,7 +239,7 @@ Biases biases_of(const MotionModel& model, const std::vector<Path>& paths) {
   return out;
 }
 
-/// What is estimated beside the noise, and integrated over.
+/// Estimates beside the noise, which are integrated over.
 struct Estimated {
   Biases biases;
   NoiseRestriction columns;

@@ -1,4 +1,4 @@
-/// What estimated columns take from the noise. They follow part of it, so that the noise of maximum likelihood is too small where a
+/// The part of the noise that estimated columns follow, so that the noise of maximum likelihood is too small where a
 /// map with many columns was fitted. The restricted likelihood (Patterson and Thompson 1971, Biometrika 58) is the integral over the
 /// columns; in Laplace's approximation it adds -log|I(v)| / 2, where I is the information of the columns under the variances v.
 #pragma once
@@ -16,7 +16,7 @@ struct NoiseRestriction {
   FittedVariances weights = FittedVariances::Zero();  ///< one over variance
   double other = 1;
 
-  /// What the restricted log likelihood adds, up to a constant.
+  /// The part that the restricted log likelihood adds, up to a constant.
   [[nodiscard]] double operator()(const FittedVariances& variances) const;
 };
 

@@ -153,7 +153,7 @@ void add_pairs_of_drifts(DictionaryBuilder& make, const Extent& extent) {
   if (commands) add_pair(make, kSlip, robot_part(extent), command_part(extent));
 }
 
-/// What the camera shows of single robots, as of their markers, and of places.
+/// Errors of the camera about single robots, as about their markers, and about places.
 void add_pairs_of_sight(DictionaryBuilder& make, const Extent& extent) {
   add_pair(make, kCamera, place_part(extent, 2), heading_part(2));
   add_pair(make, kCamera, place_part(extent, 3), time_part(extent, 4));

@@ -218,7 +218,7 @@ void SearchLoop::add(const Finding& found, double threshold) {
   }
   out_.fit.model.terms.push_back(std::move(term));
   out_.reasons.push_back(reason);
-  fitter_.fit_until_settled(out_.fit);
+  fitter_.fit(out_.fit, 2);
   out_.steps.push_back({h.name, found.held_out});
   if (!merged()) refine_shape(out_.fit.model.terms.size() - 1);
 }

@@ -51,15 +51,16 @@ bool SearchLoop::exchanged(std::size_t place, const Finding& own) {
     Contender& most = contenders.try_emplace(others[h]->name, Contender{others[h], findings[h]}).first->second;
     if (findings[h].evidence > most.finding.evidence) most = {others[h], findings[h]};
   }
+  // The term may be a poor form of its own kind.
+  const auto of_name = contenders.find(name);
+  const double of_kind = std::max(own.evidence, of_name != contenders.end() ? of_name->second.finding.evidence : 0);
+  const double clear = std::max(own.evidence + std::max(kClose, kRemnant * own.evidence), of_kind);
   std::vector<Contender> best;
   for (const auto& [other, contender] : contenders)
-    if (other != name && contender.finding.evidence > kContenderShare * own.evidence) best.push_back(contender);
+    if (other != name && contender.finding.evidence > kContenderShare * of_kind) best.push_back(contender);
   std::sort(best.begin(), best.end(),
             [](const Contender& a, const Contender& b) { return a.finding.evidence > b.finding.evidence; });
   if (best.size() > kMostContenders) best.resize(kMostContenders);
-  const auto of_name = contenders.find(name);
-  const double clear = std::max(own.evidence + std::max(kClose, kRemnant * own.evidence),
-                                of_name != contenders.end() ? of_name->second.finding.evidence : 0);
   for (const Contender& one : best) {
     const Attempt attempt{Attempt::Kind::kExchange, {one.hypothesis->name, name}};
     if (failed_.contains(attempt)) continue;
