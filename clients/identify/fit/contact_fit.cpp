@@ -86,6 +86,7 @@ void Fitter::fit_walls(FitState& state) const {
   // Positions of a side, mm: coarse steps from the edge of the visited places on, then fine ones about the best.
   constexpr double kCoarse_mm = 2, kInside_mm = 2, kBeyond_mm = 4;
   constexpr std::array<double, 4> kFine_mm = {-1.0, 1.0, -0.5, 0.5};
+  const int coarse = static_cast<int>(std::floor((kInside_mm + reach + kBeyond_mm) / kCoarse_mm)) + 1;
   Walls reached;
   // Whether the side became a wall, by a gain of more than `least` in log likelihood.
   const auto fit_side = [&](const Side& side, double least) {
@@ -117,7 +118,6 @@ void Fitter::fit_walls(FitState& state) const {
       best_value = value;
       best = trial;
     };
-    const auto coarse = static_cast<int>(std::floor((kInside_mm + reach + kBeyond_mm) / kCoarse_mm)) + 1;
     for (int i = 0; i < coarse; ++i) try_at(edge - kInside_mm + i * kCoarse_mm);
     const double found = side.sign * best.walls.*side.wall;
     if (std::isinf(found)) return false;
@@ -128,7 +128,7 @@ void Fitter::fit_walls(FitState& state) const {
   // Least gain of a wall, in log likelihood: covers chance and a few outliers. Three such walls make a fourth likely: then a
   // Bayes factor of 20 is enough, for the best of all its positions.
   constexpr double kSure = 30, kLikely = 3;
-  const double positions = std::floor((kInside_mm + reach + kBeyond_mm) / kCoarse_mm) + 1 + kFine_mm.size();
+  const double positions = coarse + static_cast<double>(kFine_mm.size());
   std::vector<const Side*> open;
   for (const Side& side : sides) {
     // With headings, detected_walls() has found most walls already.
