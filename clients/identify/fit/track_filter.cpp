@@ -41,7 +41,7 @@ double outlier_factor(double distance2, int size) {
 }
 
 TrackFilter::TrackFilter(const MotionModel& model, const RobotBias& bias, std::uint32_t robot, std::uint32_t run)
-    : model_(&model), measures_(model.measures()) {
+    : model_(&model), sums_(model), measures_(model.measures()) {
   belief_.centre_mm = model.base.centre_mm;
   belief_.mean.tail<2>() = bias.mean_mm_s;
   belief_.covariance.bottomRightCorner<2, 2>() = bias.covariance;
@@ -141,7 +141,7 @@ StepRecord TrackFilter::step_freely(double time_s, double h_s, const CommandStat
   record.at_robot = model_->contacts && near.nearest_mm < model_->contact_range_mm;
   record.at_wall = commands.driven() &&
                    (at_boundary_ || model_->walls.at_wall(record.middle.x_mm, record.middle.y_mm, kWallMargin_mm));
-  record.rates = model_->rates(record.middle, belief_.mean.tail<2>());
+  record.rates = model_->rates(record.middle, belief_.mean.tail<2>(), sums_);
   if (model_->stalls && commands.driven()) apply_spells(record);
   record.arc = arc_of(record.rates, model_->base.wheel_base_mm, belief_.mean[2], h_s);
   propagate_covariance(record);

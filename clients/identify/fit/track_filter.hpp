@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "clients/identify/model/block_sums.hpp"
 #include "clients/identify/model/motion_model.hpp"
 
 namespace kilotwin::identify {
@@ -113,6 +114,7 @@ class TrackFilter {
   void propagate_covariance(const StepRecord&);
 
   const MotionModel* model_;
+  BlockSums sums_;
   Belief belief_;
   Situation place_;   ///< robot and run
   int outliers_ = 0;  ///< in a row

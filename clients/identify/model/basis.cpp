@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <utility>
 
 #include "core/base/error.hpp"
@@ -22,6 +23,18 @@ void cosines(double angle, std::uint32_t last, double* to) {
   const double start[] = {1, c, c2, c * (2 * c2 - 1), c4};
   for (std::uint32_t k = 0; k <= std::min(last, 4u); ++k) to[k] = start[k];
   for (std::uint32_t k = 5; k <= last; ++k) to[k] = 2 * c4 * to[k - 4] - (k < 8 ? to[8 - k] : to[k - 8]);
+}
+
+/// cos(k a), sin(k a), k = first..first + count - 1, by rotations: one sine and one cosine in place of `count`.
+void harmonics(double angle, std::uint32_t first, std::uint32_t count, double* to) {
+  const std::complex<double> step = std::polar(1.0, angle);
+  std::complex<double> now = first == 1 ? step : std::polar(1.0, first * angle);
+  for (std::uint32_t k = 0; k < count; ++k) {
+    to[2 * k] = now.real();
+    to[2 * k + 1] = now.imag();
+    now = {now.real() * step.real() - now.imag() * step.imag(),
+           now.real() * step.imag() + now.imag() * step.real()};
+  }
 }
 
 /// Legendre polynomials P_k(at), k = 0..last.
@@ -103,12 +116,7 @@ void Factor::columns_at(double c, double d, double span_s, double* to) const {
         for (std::uint32_t k = 0; k <= sum; ++k) *to++ = a[sum - k] * b[k];
       return;
     case Shape::kHarmonics:
-    case Shape::kTravelling:
-      for (std::uint32_t k = 0; k < count; ++k) {
-        to[2 * k] = std::cos((first + k) * c);
-        to[2 * k + 1] = std::sin((first + k) * c);
-      }
-      return;
+    case Shape::kTravelling: harmonics(c, first, count, to); return;
     case Shape::kTable:
       for (std::size_t i = 0; i < points.size(); ++i) to[i] = c == points[i] ? 1 : 0;
       return;

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "clients/identify/model/block_sums.hpp"
+
 namespace kilotwin::identify {
 
 bool is_camera_map(const Term& term) {
@@ -36,30 +38,27 @@ Eigen::Vector2d nominal_speeds(const BaseParameters& base, Motion motion) {
 
 namespace {
 
-/// Calls take(block, sum) for the blocks that act under a command: those of the measurement model, or of the motion model.
-/// sum(wheel): the weighted sum of the block's columns in a situation. Blocks whose columns are all 0 may be left out.
-template <class Take>
-void for_each_block(const std::vector<Term>& terms, const Situation& s, bool measured, Take&& take) {
+/// Calls take(block, value) for the blocks of the measurement model that act under a command, with the weighted sum of their columns in a
+/// situation.
+template <class Take> void for_each_measurement(const std::vector<Term>& terms, const Situation& s, Take&& take) {
   std::array<double, kMostColumns> columns;
-  const Basis* held = nullptr;  // whose columns at the left wheel are there
+  const Basis* held = nullptr;  // whose columns are there
   for (const Term& term : terms) {
     const double* coefficients = term.coefficients.data();
     for (const Block& block : term.blocks) {
       const auto n = static_cast<Eigen::Index>(block.basis.size());
       const Eigen::Map<const Eigen::VectorXd> own(coefficients, n);
       coefficients += n;
-      if (is_measured(block.target) != measured || (block.during >> static_cast<int>(s.commands.command) & 1) == 0)
+      if (!is_measured(block.target) || (block.during >> static_cast<int>(s.commands.command) & 1) == 0 ||
+          block.basis.lacks_key(s))
         continue;
-      if (block.basis.lacks_key(s)) continue;
-      take(block, [&](std::size_t wheel) {
-        // Blocks of a term often have the same basis: both axes of a drift, for example.
-        constexpr Eigen::Index kWorthIt = 8;
-        if (n < kWorthIt || wheel != 0 || held == nullptr || !(*held == block.basis)) {
-          block.basis.evaluate(s, wheel, columns.data());
-          held = wheel == 0 ? &block.basis : nullptr;
-        }
-        return Eigen::Map<const Eigen::VectorXd>(columns.data(), n).dot(own);
-      });
+      // Both axes often have the same basis.
+      constexpr Eigen::Index kWorthIt = 8;
+      if (n < kWorthIt || held == nullptr || !(*held == block.basis)) {
+        block.basis.evaluate(s, 0, columns.data());
+        held = &block.basis;
+      }
+      take(block, Eigen::Map<const Eigen::VectorXd>(columns.data(), n).dot(own));
     }
   }
 }
@@ -98,6 +97,11 @@ void add(const Block& block, double left, double right, double wheel_base_mm, Mo
 }  // namespace
 
 Rates MotionModel::rates(const Situation& s, const Eigen::Vector2d& bias_mm_s) const {
+  BlockSums sums(*this);
+  return rates(s, bias_mm_s, sums);
+}
+
+Rates MotionModel::rates(const Situation& s, const Eigen::Vector2d& bias_mm_s, BlockSums& sums) const {
   Rates r;
   if (s.commands.driven()) {
     const Eigen::Vector2d v = nominal_speeds(base, s.commands.command) + bias_mm_s;
@@ -105,9 +109,8 @@ Rates MotionModel::rates(const Situation& s, const Eigen::Vector2d& bias_mm_s) c
     r.right_base_mm_s = v[1];
   }
   MotionChange change;
-  for_each_block(terms, s, false, [&](const Block& block, const auto& sum) {
-    const double left = sum(0);
-    add(block, left, block.basis.per_wheel() ? sum(1) : left, base.wheel_base_mm, change, r);
+  sums.for_each(s, [&](const Block& block, double left, double right) {
+    add(block, left, right, base.wheel_base_mm, change, r);
   });
   static_cast<DriveSpeeds&>(r) = changed_speeds(r.left_base_mm_s, r.right_base_mm_s, change, kEffectsLimit_mm_s);
   r.left_gain = change.left_gain;
@@ -138,8 +141,7 @@ Eigen::Vector3d MotionModel::measured(double x_mm, double y_mm, double heading_r
     there.x_mm = x_mm + base.centre_mm * c;
     there.y_mm = y_mm + base.centre_mm * s;
     there.heading_rad = heading_rad;
-    for_each_block(terms, there, true, [&](const Block& block, const auto& sum) {
-      const double v = sum(0);
+    for_each_measurement(terms, there, [&](const Block& block, double v) {
       switch (block.target) {
         case Target::kMeasuredX: x += v; break;
         case Target::kMeasuredY: y += v; break;

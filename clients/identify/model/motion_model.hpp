@@ -70,6 +70,7 @@ enum class Target : std::uint8_t {
   kMeasuredTurn,     ///< rad: rotation of the whole image about its origin, headings included
   kMeasuredHeading,  ///< rad
 };
+[[nodiscard]] constexpr bool is_gain(Target target) { return target <= Target::kGainRight; }
 [[nodiscard]] constexpr bool is_measured(Target target) { return target >= Target::kMeasuredX; }
 
 inline constexpr std::uint8_t kDriven = 0b1110, kAlways = 0b1111;  ///< bits 1 << Motion
@@ -112,6 +113,8 @@ struct Rates : DriveSpeeds {
   }
 };
 
+class BlockSums;  // block_sums.hpp
+
 struct MotionModel {
   BaseParameters base;
   Noise noise;
@@ -143,6 +146,8 @@ struct MotionModel {
   /// The robot's posterior, or the population distribution.
   [[nodiscard]] RobotBias bias_of(std::uint32_t robot) const;
   [[nodiscard]] Rates rates(const Situation&, const Eigen::Vector2d& bias_mm_s) const;
+  /// The same in many situations. `sums`: of this model.
+  [[nodiscard]] Rates rates(const Situation&, const Eigen::Vector2d& bias_mm_s, BlockSums& sums) const;
   [[nodiscard]] bool looks_at(const Axis&) const;
   [[nodiscard]] bool measures() const;  ///< whether any term is a measurement effect
 

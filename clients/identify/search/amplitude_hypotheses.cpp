@@ -93,17 +93,16 @@ void put_in_order(std::string& name, std::vector<std::string>& words) {
     name += (name.empty() ? "" : "-and-") + std::string(place(word) == kOrder.end() ? word : place(word)->first);
 }
 
-/// The amplitude of a known function may depend on time, place or heading. The known factors come
-/// first, so that they are written once.
+/// The amplitude of a known function may depend on one more covariate. The known factors come first, so that they are written once.
 void of_known_and_more(DictionaryBuilder& make, const Extent& extent, const TargetGroup& group,
                        const Multiplied& known, std::uint8_t during) {
-  if (&group == &kWorld || known.words.empty()) return;
+  if (known.words.empty()) return;
   const auto beside = [&](const char* word, Factor factor, std::initializer_list<Eigen::Index> sizes) {
     if (known.is_of(word)) return;
     Basis basis = known.basis;
     basis.factors.push_back(std::move(factor));
     const auto bases = make.put(group, basis, during);
-    std::string name = known.name + "-and-" + word;
+    std::string name = known.name + "-and-" + covariate_words(basis.factors.back().axis.of).first;
     std::vector<std::string> words = known.words;
     words.emplace_back(word);
     // Apart from maps that change with time, whose name is the other way round.
@@ -114,26 +113,39 @@ void of_known_and_more(DictionaryBuilder& make, const Extent& extent, const Targ
     put_in_order(name, words);
     for (const Eigen::Index size : sizes) make.add(group, name, words, some(bases, 0, size));
   };
-  beside("time", over(Shape::kCosines, Covariate::kTime, 0, extent.duration_s, 6), {1, 2, 6});
+  beside("time", over(Shape::kCosines, Covariate::kTime, 0, extent.duration_s, 16), {1, 2, 6, 16});
   beside("position", plane(extent, 3), {1, 2, 9});
   beside("heading", over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 2), {2, 4});
+  if (extent.has_stop)
+    beside("motor_time", over(Shape::kCosines, Covariate::kMotorTimeSum, 0, extent.sum_s, 16), {1, 2, 6, 16});
+  Factor since = over(Shape::kCosines, Covariate::kSinceCommand, 0, extent.since_s, 5);
+  since.warp = 1;
+  beside("time_since_command", since, {1, 2, 5});
+  if (!extent.neighbours) return;
+  constexpr std::uint8_t kRadius = 8;
+  Factor near = over(Shape::kTaper, Covariate::kNearest, 0, kNeighbourRadii_mm[kRadius], 3);
+  near.axis.radius = kRadius;
+  beside("neighbours", near, {1, 3});
 }
 
 }  // namespace
 
 void add_amplitude_hypotheses(DictionaryBuilder& make, const Extent& extent, const std::vector<Term>& terms) {
   constexpr std::size_t kMostRobots = 40;
-  for (const Term& term : terms) {
+  for (const Term& whole : terms) {
+    const Term term = main_part(whole);
     const Block& block = term.blocks.front();
-    const TargetGroup* group = nullptr;
-    for (const TargetGroup* one : {&kSpeed, &kTurning, &kSlip, &kWorld})
-      if (one->targets.front() == block.target) group = one;
-    const std::optional<Multiplied> known = group != nullptr ? multiplied_by(term) : std::nullopt;
+    std::optional<TargetGroup> group;
+    if (is_gain(block.target)) group = {kSpeed.name, kSpeed.in_words, {block.target}, {}};
+    for (const TargetGroup* one : {&kTurning, &kSlip, &kWorld})
+      if (one->targets.front() == block.target) group = *one;
+    const std::optional<Multiplied> known = group ? multiplied_by(term) : std::nullopt;
     if (!known) continue;
+    const bool is_drift = group->targets.size() > 1;
     const auto amplitudes = [&](Covariate covariate, const std::vector<double>& keys) {
       const auto [name, word] = covariate_words(covariate);
       // The amplitudes of a drift along x and along y share one shape only for a single-component curve.
-      if ((group == &kWorld && !known->words.empty()) || known->is_of(word)) return;
+      if ((is_drift && !known->words.empty()) || known->is_of(word)) return;
       Basis basis = known->basis;
       basis.factors.insert(basis.factors.begin(), keyed(Shape::kTable, covariate, keys));
       std::vector<std::string> words = known->words;
@@ -144,9 +156,10 @@ void add_amplitude_hypotheses(DictionaryBuilder& make, const Extent& extent, con
                some(make.put(*group, basis, block.during), 0, static_cast<Eigen::Index>(keys.size())));
     };
     if (extent.has_straight && extent.has_turns) amplitudes(Covariate::kCommand, {1, 2, 3});
-    if (group != &kWorld && extent.robots.size() > 1 && extent.robots.size() <= kMostRobots)
+    if (extent.has_stop || extent.has_turns) amplitudes(Covariate::kPreviousCommand, {0, 1, 2, 3, kNoCommand});
+    if (!is_drift && extent.robots.size() > 1 && extent.robots.size() <= kMostRobots)
       amplitudes(Covariate::kRobot, {extent.robots.begin(), extent.robots.end()});
-    of_known_and_more(make, extent, *group, *known, block.during);
+    if (!is_drift) of_known_and_more(make, extent, *group, *known, block.during);
   }
 }
 

@@ -27,9 +27,10 @@ std::optional<std::size_t> source_of(const MotionModel& model, const Term& ampli
   std::erase_if(known, [](const Factor& f) { return !is_known(f); });
   if (known.empty() || block.basis.factors.size() != known.size() + 1) return std::nullopt;
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
-    const Block& of = model.terms[t].blocks.front();
-    if (&model.terms[t] == &amplitudes || of.target != block.target || of.during != block.during) continue;
-    const std::vector<Factor> functions = functions_of(model.terms[t]);
+    if (&model.terms[t] == &amplitudes) continue;
+    const Term part = main_part(model.terms[t]);
+    if (part.blocks.front().target != block.target || part.blocks.front().during != block.during) continue;
+    const std::vector<Factor> functions = functions_of(part);
     if (std::equal(known.begin(), known.end(), functions.begin(), functions.end(), alike)) return t;
   }
   return std::nullopt;
@@ -59,7 +60,7 @@ std::optional<std::size_t> merge_amplitudes(const Fitter& fitter, FitState& stat
   const std::optional<std::size_t> source = source_of(state.model, state.model.terms.back());
   if (!source) return std::nullopt;
   FitState trial = state;
-  std::vector<Factor> functions = functions_of(trial.model.terms[*source]);
+  std::vector<Factor> functions = functions_of(main_part(trial.model.terms[*source]));
   functions.push_back(amplitudes_of(trial.model.terms.back()));
   trial.model.terms.erase(trial.model.terms.begin() + static_cast<std::ptrdiff_t>(*source));
   ProductFit product(fitter, trial, trial.model.terms.size() - 1, std::move(functions));

@@ -1,6 +1,7 @@
 #include "clients/identify/search/products.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -25,7 +26,6 @@ constexpr std::uint32_t kNodes = 97;
 constexpr double kAlways_s = 1e6;
 
 bool is_of_place(const Factor& f) { return f.axis.of == Covariate::kX || f.axis.of == Covariate::kY; }
-bool is_gain(Target t) { return t == Target::kGain || t == Target::kGainLeft || t == Target::kGainRight; }
 
 /// A block's open factor with its share of the coefficients; null: a constant.
 struct Summand {
@@ -163,6 +163,62 @@ std::vector<Factor> functions_of_switch(const Term& term) {
   return functions;
 }
 
+/// The coefficients of a term as a matrix over the columns of its two open factors.
+struct Pair {
+  Factor one, other;
+  std::vector<std::pair<Eigen::Index, Eigen::Index>> at;  ///< row and column of each coefficient
+};
+
+/// The blocks of a term that act on one target: two open factors each, of which the first continues the cosines of the block before.
+/// Nothing: another term.
+std::optional<Pair> pair_of(const Term& term) {
+  Pair pair;
+  Eigen::Index rows = 0;
+  for (const Block& block : term.blocks) {
+    const std::vector<Factor>& f = block.basis.factors;
+    if (f.size() != 2 || !f[0].known.empty() || !f[1].known.empty() || block.target != term.blocks.front().target ||
+        block.during != term.blocks.front().during)
+      return std::nullopt;
+    if (rows == 0) {
+      pair.one = f[0];
+      pair.other = f[1];
+    } else {
+      const bool continues = pair.one.shape == Shape::kCosines && f[0].shape == Shape::kCosines &&
+                             pair.one.axis == f[0].axis && f[0].first == pair.one.first + pair.one.count &&
+                             f[1].shape == pair.other.shape && f[1].count == pair.other.count;
+      if (!continues) return std::nullopt;
+      pair.one.count += f[0].count;
+    }
+    const auto across = static_cast<Eigen::Index>(f[1].size());
+    for (std::size_t i = 0; i < block.basis.size(); ++i) {
+      const auto column = static_cast<Eigen::Index>(block.basis.chosen.empty() ? i : block.basis.chosen[i]);
+      pair.at.emplace_back(rows + column / across, column % across);
+    }
+    rows += static_cast<Eigen::Index>(f[0].size());
+  }
+  if (pair.one.size() < 2 || pair.other.size() < 2) return std::nullopt;
+  return pair;
+}
+
+/// The functions of a term over two open factors whose coefficients are nearly a product, as the time after one kind of command is.
+std::vector<Factor> functions_of_pair(const Term& term) {
+  constexpr double kShare = 0.8;  // of the sum of squares of the coefficients
+  const std::optional<Pair> pair = pair_of(term);
+  if (!pair || pair->one.of_two() || pair->other.of_two()) return {};
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(pair->one.columns()),
+                                                 static_cast<Eigen::Index>(pair->other.columns()));
+  for (std::size_t k = 0; k < pair->at.size(); ++k)
+    matrix(pair->at[k].first, pair->at[k].second) = term.coefficients[static_cast<Eigen::Index>(k)];
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(matrix, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const double largest = svd.singularValues()[0];
+  if (!(largest > 0) || largest * largest < kShare * matrix.squaredNorm()) return {};
+  const Eigen::VectorXd of_one = svd.matrixU().col(0), of_other = largest * svd.matrixV().col(0);
+  std::vector<Factor> functions{pair->one, pair->other};
+  functions[0].known.assign(of_one.begin(), of_one.end());
+  functions[1].known.assign(of_other.begin(), of_other.end());
+  return functions;
+}
+
 /// How rich a function is. The richest stays open.
 int richness(const Factor& f) {
   // A curve along one axis may become a map.
@@ -258,7 +314,7 @@ std::vector<Factor> functions_of(const Term& term) {
   if (!open) {
     // A product of known functions, with one coefficient.
     functions = term.blocks.front().basis.factors;
-    if (term.coefficients.size() != 1 || functions.empty()) return {};
+    if (term.coefficients.size() != 1 || functions.empty()) return functions_of_pair(term);
     scale(functions.back(), term.coefficients[0]);
     return functions;
   }
@@ -495,43 +551,6 @@ void ProductFit::fit() {
 
 namespace {
 
-/// The coefficients of a general term as a matrix over the columns of its two factors.
-struct Pair {
-  Factor one, other;
-  std::vector<std::pair<Eigen::Index, Eigen::Index>> at;  ///< row and column of each coefficient
-};
-
-/// The blocks of a term that act on one target: two open factors each, of which the first continues the cosines of the block before.
-/// Nothing: another term.
-std::optional<Pair> pair_of(const Term& term) {
-  Pair pair;
-  Eigen::Index rows = 0;
-  for (const Block& block : term.blocks) {
-    const std::vector<Factor>& f = block.basis.factors;
-    if (f.size() != 2 || !f[0].known.empty() || !f[1].known.empty() || block.target != term.blocks.front().target ||
-        block.during != term.blocks.front().during)
-      return std::nullopt;
-    if (rows == 0) {
-      pair.one = f[0];
-      pair.other = f[1];
-    } else {
-      const bool continues = pair.one.shape == Shape::kCosines && f[0].shape == Shape::kCosines &&
-                             pair.one.axis == f[0].axis && f[0].first == pair.one.first + pair.one.count &&
-                             f[1].shape == pair.other.shape && f[1].count == pair.other.count;
-      if (!continues) return std::nullopt;
-      pair.one.count += f[0].count;
-    }
-    const auto across = static_cast<Eigen::Index>(f[1].size());
-    for (std::size_t i = 0; i < block.basis.size(); ++i) {
-      const auto column = static_cast<Eigen::Index>(block.basis.chosen.empty() ? i : block.basis.chosen[i]);
-      pair.at.emplace_back(rows + column / across, column % across);
-    }
-    rows += static_cast<Eigen::Index>(f[0].size());
-  }
-  if (pair.one.size() < 2 || pair.other.size() < 2) return std::nullopt;
-  return pair;
-}
-
 /// Separable coefficients that fit best: the vectors of both factors, and their gain in log likelihood.
 struct RankOne {
   Eigen::VectorXd one, other;
@@ -626,6 +645,16 @@ void add_target(Term& product, const std::vector<Factor>& functions, const Block
 }
 
 }  // namespace
+
+Term main_part(const Term& term) {
+  if (term.blocks.empty() || !is_gain(term.blocks.front().target)) return term;
+  std::vector<OneTarget> targets = by_target(term);
+  return std::max_element(targets.begin(), targets.end(),
+                          [](const OneTarget& a, const OneTarget& b) {
+                            return a.term.coefficients.norm() < b.term.coefficients.norm();
+                          })
+      ->term;
+}
 
 bool separate(const Fitter& fitter, FitState& state, std::size_t place) {
   constexpr double kLeastShare = 0.5;

@@ -107,6 +107,18 @@ ColumnGroups columns_read_by_test(const MotionModel& model, const Dictionary& di
   return read;
 }
 
+/// The model's columns except one term's, with what reduces other columns by them.
+struct ScoreTest::Beside {
+  struct Fold {
+    const Eigen::MatrixXd* information;  ///< of all columns
+    Eigen::MatrixXd own;                 ///< of these columns
+    Eigen::VectorXd score;               ///< of all columns, without the term
+  };
+  std::vector<Eigen::Index> columns;
+  Eigen::LDLT<Eigen::MatrixXd> solver;  ///< of their information and prior
+  std::vector<Fold> by_unit, by_cluster;
+};
+
 struct ScoreTest::Reduced {
   Eigen::MatrixXd information;
   Eigen::VectorXd score;
@@ -173,12 +185,9 @@ ScoreTest::ScoreTest(const Fitter& fitter, const MotionModel& model, const std::
   score_ += from;
 }
 
-/// Information and score of columns, reduced by the model's columns except one term's, for all folds.
-ScoreTest::Reduced ScoreTest::reduce(const std::vector<Eigen::Index>& columns, int without_term,
-                                     bool by_cluster) const {
-  const Folds& folds = by_cluster ? by_cluster_ : by_unit_;
-  std::vector<Eigen::Index> nuisance;
-  for (Eigen::Index i = 0; i < kBaseColumns; ++i) nuisance.push_back(i);
+ScoreTest::Beside ScoreTest::beside(int without_term) const {
+  Beside out;
+  for (Eigen::Index i = 0; i < kBaseColumns; ++i) out.columns.push_back(i);
   Eigen::VectorXd taken_out = Eigen::VectorXd::Zero(information_.rows());
   Eigen::Index first = kBaseColumns;
   for (std::size_t t = 0; t < model_.terms.size(); ++t) {
@@ -186,38 +195,44 @@ ScoreTest::Reduced ScoreTest::reduce(const std::vector<Eigen::Index>& columns, i
     if (static_cast<int>(t) == without_term) {
       taken_out.segment(first, n) = model_.terms[t].coefficients;
     } else {
-      for (Eigen::Index i = 0; i < n; ++i) nuisance.push_back(first + i);
+      for (Eigen::Index i = 0; i < n; ++i) out.columns.push_back(first + i);
     }
     first += n;
   }
-  const bool moved = without_term >= 0;
-  const auto score_of = [&](const Eigen::MatrixXd& information, const Eigen::VectorXd& score) {
-    return moved ? Eigen::VectorXd(score + information * taken_out) : score;
-  };
+  Eigen::MatrixXd own = information_(out.columns, out.columns);
+  own.diagonal() += prior_(out.columns);
+  out.solver.compute(own);
+  for (const bool by_cluster : {false, true}) {
+    const Folds& folds = by_cluster ? by_cluster_ : by_unit_;
+    for (std::size_t f = 0; f < folds.score.size(); ++f) {
+      const Eigen::MatrixXd& information = folds.information[f];
+      Beside::Fold& fold = (by_cluster ? out.by_cluster : out.by_unit).emplace_back();
+      fold.information = &information;
+      fold.own = information(out.columns, out.columns);
+      fold.score = folds.score[f];
+      if (without_term >= 0) fold.score += information * taken_out;
+    }
+  }
+  return out;
+}
+
+/// Information and score of columns, reduced by those beside them, for all folds.
+ScoreTest::Reduced ScoreTest::reduce(const std::vector<Eigen::Index>& columns, const Beside& beside,
+                                     bool by_cluster) const {
+  const Eigen::MatrixXd by = beside.solver.solve(information_(beside.columns, columns));
   Reduced out;
-  Eigen::MatrixXd own = information_(nuisance, nuisance);
-  for (std::size_t i = 0; i < nuisance.size(); ++i)
-    own(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(i)) += prior_[nuisance[i]];
-  const Eigen::MatrixXd cross = information_(nuisance, columns);
-  const Eigen::MatrixXd by = own.ldlt().solve(cross);
-  const auto reduced = [&](const Eigen::MatrixXd& information) {
-    const Eigen::MatrixXd part = information(nuisance, columns);
-    Eigen::MatrixXd result = information(columns, columns);
-    result -= by.transpose() * part;
-    result -= part.transpose() * by;
-    result += by.transpose() * Eigen::MatrixXd(information(nuisance, nuisance)) * by;
-    return result;
-  };
-  const auto reduced_score = [&](const Eigen::VectorXd& score) {
-    return Eigen::VectorXd(score(columns) - by.transpose() * score(nuisance));
-  };
   out.information =
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(columns.size()), static_cast<Eigen::Index>(columns.size()));
   out.score = Eigen::VectorXd::Zero(out.information.rows());
-  for (std::size_t f = 0; f < folds.score.size(); ++f) {
-    out.fold_information.push_back(reduced(folds.information[f]));
-    out.fold_score.push_back(reduced_score(score_of(folds.information[f], folds.score[f])));
-    out.information += out.fold_information.back();
+  for (const Beside::Fold& fold : by_cluster ? beside.by_cluster : beside.by_unit) {
+    const Eigen::MatrixXd part = (*fold.information)(beside.columns, columns);
+    Eigen::MatrixXd information = (*fold.information)(columns, columns);
+    information -= by.transpose() * part;
+    information -= part.transpose() * by;
+    information += by.transpose() * fold.own * by;
+    out.information += information;
+    out.fold_information.push_back(std::move(information));
+    out.fold_score.push_back(fold.score(columns) - by.transpose() * fold.score(beside.columns));
     out.score += out.fold_score.back();
   }
   return out;
@@ -261,11 +276,15 @@ Finding ScoreTest::evidence_of(const Reduced& reduced, const Eigen::VectorXd& sc
   return found;
 }
 
-Finding ScoreTest::evidence_of(const Hypothesis& hypothesis, int without_term) const {
+Finding ScoreTest::evidence_of(const Hypothesis& hypothesis, const Beside& beside) const {
   std::vector<Eigen::Index> columns;
   for (const Eigen::Index c : hypothesis.columns) columns.push_back(own_ + c);
-  return evidence_of(reduce(columns, without_term, of_robots(hypothesis)), dictionary_.scale(hypothesis.columns),
+  return evidence_of(reduce(columns, beside, of_robots(hypothesis)), dictionary_.scale(hypothesis.columns),
                      hypothesis.log_choices);
+}
+
+Finding ScoreTest::evidence_of(const Hypothesis& hypothesis, int without_term) const {
+  return evidence_of(hypothesis, beside(without_term));
 }
 
 Finding ScoreTest::evidence_of_term(int term) const {
@@ -276,13 +295,14 @@ Finding ScoreTest::evidence_of_term(int term) const {
   for (Eigen::Index i = 0; i < own.coefficients.size(); ++i) columns.push_back(first + i);
   const bool of_each = std::any_of(own.blocks.begin(), own.blocks.end(),
                                    [](const Block& block) { return block.basis.looks_at(Covariate::kRobot); });
-  return evidence_of(reduce(columns, term, of_each), own.precision.cwiseInverse().cwiseSqrt(), 0);
+  return evidence_of(reduce(columns, beside(term), of_each), own.precision.cwiseInverse().cwiseSqrt(), 0);
 }
 
 std::vector<Finding> ScoreTest::evidence_of_each(const std::vector<const Hypothesis*>& hypotheses,
                                                  int without_term) const {
   std::vector<Finding> out(hypotheses.size());
-  os::in_parallel(out.size(), threads_, [&](std::size_t h) { out[h] = evidence_of(*hypotheses[h], without_term); });
+  const Beside others = beside(without_term);
+  os::in_parallel(out.size(), threads_, [&](std::size_t h) { out[h] = evidence_of(*hypotheses[h], others); });
   return out;
 }
 
@@ -361,10 +381,11 @@ ScoreTest::Outcome ScoreTest::test(std::uint64_t seed, Tail tail) const {
   const double sd = std::sqrt((worst.array() - mean).square().mean());
   const double gumbel = -std::log(-std::log1p(-kFamilyAlarm));
   out.threshold_log10_p = mean - std::max(sd, 0.4) * std::sqrt(6.0) / M_PI * (gumbel - 0.5772);
+  const Beside model = beside(-1);
   os::in_parallel(out.findings.size(), threads_, [&](std::size_t h) {
     Finding& finding = out.findings[h];
     if (finding.log10_p > out.threshold_log10_p) return;
-    const Finding result = evidence_of(dictionary_.hypotheses[h], -1);
+    const Finding result = evidence_of(dictionary_.hypotheses[h], model);
     finding.evidence = result.evidence;
     finding.relative_scale = result.relative_scale;
     finding.held_out = result.held_out;

@@ -62,6 +62,7 @@ class ScoreTest {
   static constexpr double kFamilyAlarm = 0.003;
 
  private:
+  struct Beside;
   struct Reduced;
   /// Information, scores per cluster and score of the dictionary's columns beside the model.
   struct ReducedDictionary {
@@ -71,7 +72,9 @@ class ScoreTest {
   [[nodiscard]] ReducedDictionary reduced_dictionary() const;
   [[nodiscard]] Finding finding_of(std::size_t hypothesis, const ReducedDictionary&, const Eigen::MatrixXd& flipped,
                                    Tail, Eigen::VectorXd& flips_log10_p) const;
-  [[nodiscard]] Reduced reduce(const std::vector<Eigen::Index>& columns, int without_term, bool by_cluster) const;
+  [[nodiscard]] Beside beside(int without_term) const;
+  [[nodiscard]] Reduced reduce(const std::vector<Eigen::Index>& columns, const Beside&, bool by_cluster) const;
+  [[nodiscard]] Finding evidence_of(const Hypothesis&, const Beside&) const;
   [[nodiscard]] Finding evidence_of(const Reduced&, const Eigen::VectorXd& scale, double log_choices) const;
 
   const MotionModel& model_;
