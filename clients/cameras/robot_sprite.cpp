@@ -64,8 +64,9 @@ RobotSprite paint(const Look& look, double texels_per_mm, double battery_brightn
     for (int column = 0; column < 2 * half; ++column) {
       cv::Vec4d sum;
       for (int sample = 0; sample < kSamples * kSamples; ++sample) {
-        const double x = (column + (sample % kSamples + 0.5) / kSamples) / texels_per_mm - sprite.half_mm;
-        const double y = (row + (sample / kSamples + 0.5) / kSamples) / texels_per_mm - sprite.half_mm;
+        const int along = sample % kSamples, down = sample / kSamples;
+        const double x = (column + (along + 0.5) / kSamples) / texels_per_mm - sprite.half_mm;
+        const double y = (row + (down + 0.5) / kSamples) / texels_per_mm - sprite.half_mm;
         const double radius = std::hypot(x, y);
         if (radius > kRobotRadius_mm) continue;
         const Colour c =

@@ -11,7 +11,7 @@ Scene scene_of(const observe::SwarmAt& now, const observe::SwarmAt* earlier) {
     view.robot = robot;
     view.pose = {swarm.x_mm[robot], swarm.y_mm[robot], swarm.heading_rad[robot]};
     view.led = swarm.led[robot];
-    if (passed_s > 0) {
+    if (earlier != nullptr && passed_s > 0) {
       const SwarmView& before = earlier->swarm;
       view.vx_mm_s = (view.pose.x_mm - before.x_mm[robot]) / passed_s;
       view.vy_mm_s = (view.pose.y_mm - before.y_mm[robot]) / passed_s;

@@ -127,6 +127,7 @@ int debug(const DebugArguments& given) {
   std::vector<std::string> words{"gdb", "-q", "-p", process, "-x", script.string()};
   if (!arguments.commands.empty()) words.emplace_back("-batch");
   std::vector<char*> argv;
+  argv.reserve(words.size() + 1);
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   // gdb takes the place of this process: it has the terminal, and the run ends with it.

@@ -81,6 +81,7 @@ Finding check_dds(std::optional<std::uint32_t> wanted) {
 Finding check_address_space() {
   // Programs are loaded at fixed addresses (services/behaviours/image.hpp).
   constexpr std::uintptr_t kProbe = 0x20000000;
+  // NOLINTNEXTLINE(performance-no-int-to-ptr)
   void* const at = mmap(reinterpret_cast<void*>(kProbe), 4096, PROT_NONE,
                         MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED_NOREPLACE, -1, 0);
   if (at == MAP_FAILED)

@@ -18,6 +18,7 @@ int become(const std::string& name, const std::string& command, const std::vecto
   std::vector<std::string> words{"kilotwin", command};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
+  argv.reserve(words.size() + 1);
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   execv(program.c_str(), argv.data());
@@ -28,7 +29,7 @@ int become(const std::string& name, const std::string& command, const std::vecto
 
 std::filesystem::path program_beside(const std::string& name) {
   const std::filesystem::path here = std::filesystem::read_symlink("/proc/self/exe").parent_path();
-  const std::filesystem::path program = here / name, installed = here.parent_path() / "libexec/kilotwin" / name;
+  std::filesystem::path program = here / name, installed = here.parent_path() / "libexec/kilotwin" / name;
   if (std::filesystem::exists(program)) return program;
   if (std::filesystem::exists(installed)) return installed;
   throw RunError(
@@ -39,8 +40,7 @@ std::filesystem::path program_beside(const std::string& name) {
 
 std::filesystem::path main_program() {
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe"), here = self.parent_path();
-  const std::filesystem::path beside = here / "kilotwin",
-                              installed = here.parent_path().parent_path() / "bin/kilotwin";
+  std::filesystem::path beside = here / "kilotwin", installed = here.parent_path().parent_path() / "bin/kilotwin";
   if (!self.filename().string().starts_with("kilotwin-")) return "/proc/self/exe";
   if (std::filesystem::exists(beside) && !std::filesystem::is_directory(beside)) return beside;
   if (std::filesystem::exists(installed)) return installed;

@@ -38,7 +38,7 @@ std::vector<std::string> words_of(int argc, char** argv) {
            name.find_first_not_of(
                "abcdefghijklmnopqrstuvwxyz"
                "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
-               "0123456789_") == name.npos &&
+               "0123456789_") == std::string_view::npos &&
            !std::filesystem::exists(word, ignored);
   };
   std::vector<std::string> words;

@@ -91,6 +91,7 @@ std::string names_in_words(const std::vector<std::string>& elves) {
 
 std::vector<std::string> contents_of(const std::vector<std::filesystem::path>& objects) {
   std::vector<std::string> elves;
+  elves.reserve(objects.size());
   for (const std::filesystem::path& object : objects) elves.push_back(os::read_file(object));
   return elves;
 }

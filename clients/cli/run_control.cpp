@@ -111,12 +111,12 @@ void RunControl::send(kilotwin_open_RunCommand command, std::uint32_t steps, Sec
 
 void RunControl::place(const Relocation& where, Seconds patience) {
   const auto until = deadline(patience);
-  const auto& [movable, body, pose] = where;
   std::mutex mutex;
   std::condition_variable seen;
   bool is_there = false;
   const dds::Reader<PublicSwarmState> swarm(
       participant_, topics::swarm(), [&](const PublicSwarmState& sample, dds::SampleState state) {
+        const auto& [movable, body, pose] = where;
         const auto& x = movable ? sample.movable_x_mm : sample.x_mm;
         const auto& y = movable ? sample.movable_y_mm : sample.y_mm;
         if (!state.valid || body >= x._length || body >= y._length) return;
@@ -125,11 +125,11 @@ void RunControl::place(const Relocation& where, Seconds patience) {
         seen.notify_one();
       });
   PublicRelocation sample{};
-  sample.movable = movable;
-  sample.body = body;
-  sample.x_mm = pose.x_mm;
-  sample.y_mm = pose.y_mm;
-  sample.heading_rad = pose.heading_rad;
+  sample.movable = where.movable;
+  sample.body = where.body;
+  sample.x_mm = where.pose.x_mm;
+  sample.y_mm = where.pose.y_mm;
+  sample.heading_rad = where.pose.heading_rad;
   write(relocations_, sample, until);
   const auto paused = [this] {
     const std::lock_guard lock(mutex_);
@@ -139,7 +139,7 @@ void RunControl::place(const Relocation& where, Seconds patience) {
   while (!is_there && !paused()) {
     if (Clock::now() > until)
       throw RunError(fmt::format("{} {} did not come to stand there within {:g} s; the station's log says why",
-                                 movable ? "movable body" : "robot", body, patience.count()));
+                                 where.movable ? "movable body" : "robot", where.body, patience.count()));
     if (interrupted() != 0) throw RunError("interrupted");
     seen.wait_for(lock, kPoll);
   }

@@ -33,6 +33,7 @@ std::string csv_number(double value) { return std::isfinite(value) ? fmt::format
 std::string html_table(const std::vector<std::vector<std::string>>& rows) {
   const auto escaped = [](const std::vector<std::string>& row) {
     std::vector<std::string> cells;
+    cells.reserve(row.size());
     for (const std::string& cell : row) cells.push_back(html::escaped(cell));
     return cells;
   };

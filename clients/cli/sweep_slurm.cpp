@@ -29,7 +29,7 @@ constexpr auto kQueuePoll = std::chrono::seconds(1);
 constexpr auto kSlurmPatience = std::chrono::minutes(10);
 
 fs::path required_tool(const char* name) {
-  const fs::path tool = os::find_executable(name);
+  fs::path tool = os::find_executable(name);
   if (tool.empty())
     throw RunError(
         fmt::format("--slurm: no {} on this machine; submit from a node of the cluster that has it", name));

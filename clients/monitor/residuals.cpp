@@ -6,7 +6,7 @@
 
 namespace kilotwin::monitor {
 
-Residuals::Residuals(std::vector<std::uint32_t> robots) {
+Residuals::Residuals(const std::vector<std::uint32_t>& robots) {
   for (const std::uint32_t robot : robots) open_.emplace_back().robot = robot;
 }
 

@@ -25,7 +25,7 @@ struct Residual {
 
 class Residuals {
  public:
-  explicit Residuals(std::vector<std::uint32_t> robots);
+  explicit Residuals(const std::vector<std::uint32_t>& robots);
 
   /// `entry`: index into the robots.
   void add(std::size_t entry, const Innovation& innovation, bool is_tested);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "clients/monitor/dispersion.hpp"
 #include "clients/monitor/places.hpp"

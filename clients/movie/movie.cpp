@@ -23,10 +23,11 @@ constexpr double kLongest_s = 30;
 /// 1, 2, 5, 10, 20...: the least with which so much simulated time fits into kLongest_s.
 double fitting_pace(double simulated_s) {
   double decade = 1;
-  for (;; decade *= 10) {
+  for (;;) {
     for (const double step : {1.0, 2.0, 5.0}) {
       if (simulated_s <= kLongest_s * step * decade) return step * decade;
     }
+    decade *= 10;
   }
 }
 

@@ -153,6 +153,7 @@ std::string draw_movables(const std::vector<Snapshot>& film, const Ground& groun
   const Place origin = Place::at(0, 0, 0);
   for (std::size_t body = 0; body < ground.world().movables.size(); ++body) {
     std::vector<Frame> frames;
+    frames.reserve(film.size());
     for (const Snapshot& at : film)
       frames.push_back(frame_of(view, at.movable_x_mm[body], at.movable_y_mm[body], at.movable_heading_rad[body]));
     out += player.moving(std::move(frames), "",

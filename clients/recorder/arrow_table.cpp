@@ -85,6 +85,7 @@ Offset field(Builder& builder, const Column& column) {
 
 Offset schema(Builder& builder, const std::vector<Column>& columns, const TableMetadata& metadata) {
   std::vector<Offset> fields;
+  fields.reserve(columns.size());
   for (const Column& column : columns) fields.push_back(field(builder, column));
   const auto all = builder.CreateVector(fields);
   const auto about = pairs(builder, metadata);

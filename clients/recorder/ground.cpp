@@ -113,8 +113,9 @@ std::string draw_painted(const proto::FloorRecord& floor, const View& view, doub
   const std::size_t cells = std::size_t{floor.columns()} * floor.rows();
   for (std::size_t i = 0; i < cells; ++i) {
     if (floor.rgba()[4 * i + 3] == 0) continue;
-    const double x_mm = (static_cast<double>(i % floor.columns()) / floor.columns() - 0.5) * width_mm;
-    const double y_mm = (0.5 - static_cast<double>(i / floor.columns()) / floor.rows()) * height_mm;
+    const std::size_t column = i % floor.columns(), row = i / floor.columns();
+    const double x_mm = (static_cast<double>(column) / floor.columns() - 0.5) * width_mm;
+    const double y_mm = (0.5 - static_cast<double>(row) / floor.rows()) * height_mm;
     const long x = view.x(x_mm), y = view.y(y_mm);
     put(out, "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" {}/>\n", x, y,
         view.x(x_mm + width_mm / floor.columns()) - x, view.y(y_mm - height_mm / floor.rows()) - y,

@@ -11,7 +11,7 @@ Column column_of(const proto::VariableColumn& variable) {
           variable.integer() ? CellType::kInteger : CellType::kNumber};
 }
 
-LatestVariables::LatestVariables(const proto::RecordingHeader& header, std::vector<std::size_t> chosen) {
+LatestVariables::LatestVariables(const proto::RecordingHeader& header, const std::vector<std::size_t>& chosen) {
   for (const std::size_t variable : chosen)
     values_.push_back(
         {variable, column_of(header.variable(static_cast<int>(variable))), std::vector<Cell>(header.robots())});

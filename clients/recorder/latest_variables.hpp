@@ -13,7 +13,7 @@ namespace kilotwin::recorder {
 class LatestVariables {
  public:
   /// `chosen`: variables, as numbered by the header.
-  LatestVariables(const proto::RecordingHeader& header, std::vector<std::size_t> chosen);
+  LatestVariables(const proto::RecordingHeader& header, const std::vector<std::size_t>& chosen);
 
   /// The columns of the chosen variables, in their order.
   [[nodiscard]] std::vector<Column> columns() const;

@@ -33,7 +33,9 @@ class Ranging {
   /// Beyond entry 60, at 333 mm, readings are below half a count.
   static constexpr int kEntries = 61;
 
+  /// Of numbers above 0, in the inner loop of the channel.
   static Gains rounded(double high, double low) {
+    // NOLINTNEXTLINE(bugprone-incorrect-roundings)
     return {static_cast<std::int16_t>(high + 0.5), static_cast<std::int16_t>(low + 0.5)};
   }
   std::array<double, kEntries> high_, low_;

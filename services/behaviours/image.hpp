@@ -36,8 +36,8 @@ class Slot {
 
   /// A function or variable of the image at an offset from ElfFile::table.
   template <class T> [[nodiscard]] T at(std::uint64_t offset) const {
-    return reinterpret_cast<T>(image_ + offset);
-  }                                                                                                // NOLINT
+    return reinterpret_cast<T>(image_ + offset);  // NOLINT
+  }
   [[nodiscard]] KtExchange* exchange() const { return reinterpret_cast<KtExchange*>(exchange_); }  // NOLINT
   [[nodiscard]] KtSurroundings* surroundings() const {
     return reinterpret_cast<KtSurroundings*>(surroundings_);  // NOLINT

@@ -54,6 +54,7 @@ std::vector<std::pair<std::string, proto::Model>> models_of(const DesignArgument
   }
   files.insert(files.begin(), arguments.result / "model.txtpb");
   std::vector<std::pair<std::string, proto::Model>> models;
+  models.reserve(files.size());
   for (const fs::path& file : files) models.emplace_back(file.string(), read_model(file));
   return models;
 }

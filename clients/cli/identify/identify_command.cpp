@@ -101,11 +101,12 @@ void write_draws(std::vector<proto::Model> draws, const fs::path& train, const f
 }
 
 /// Candidates as files that `--design` reads.
-void write_candidates(std::vector<std::pair<std::string, proto::Model>> candidates, const fs::path& train,
+void write_candidates(const std::vector<std::pair<std::string, proto::Model>>& candidates, const fs::path& train,
                       const fs::path& directory) {
   if (candidates.empty()) return;
   fs::create_directory(directory);
-  for (auto& [name, model] : candidates) {
+  for (const auto& [name, found] : candidates) {
+    proto::Model model = found;
     clamp_to_ranges(model);
     const std::string remark = fmt::format(
         "Data of {} do not tell this model from model.txtpb: {} in place of another effect.", train.string(), name);
@@ -190,7 +191,7 @@ int identify_data(const IdentifyArguments& arguments) {
   os::write_file(options.model_file,
                  identify::text_of(found.model, fmt::format("Identified from {}.", arguments.train.string())));
   write_draws(found.draws, arguments.train, out / "draws");
-  write_candidates(std::move(found.candidates), arguments.train, out / "candidates");
+  write_candidates(found.candidates, arguments.train, out / "candidates");
   os::write_file(out / "result.json", identify::json_of(found.found.result()).dump(2) + "\n");
   os::write_file(out / "predictions.csv", csv_of(found.predictions));
   identify::write_report(found.found, out / "report.html");

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -28,10 +29,12 @@ struct MovieArguments {
 
 /// "1280x720". Videos need even numbers.
 void set_size(movie::Look& look, const std::string& words) {
-  char beyond = 0;
-  if (std::sscanf(words.c_str(), "%dx%d%c", &look.width_px, &look.height_px, &beyond) != 2 || look.width_px < 320 ||
-      look.height_px < 240 || look.width_px > 7680 || look.height_px > 4320 || look.width_px % 2 != 0 ||
-      look.height_px % 2 != 0)
+  const char* const end = words.data() + words.size();
+  const auto width = std::from_chars(words.data(), end, look.width_px);
+  const bool has_height = width.ec == std::errc() && width.ptr != end && *width.ptr == 'x';
+  const auto height = has_height ? std::from_chars(width.ptr + 1, end, look.height_px) : width;
+  if (!has_height || height.ec != std::errc() || height.ptr != end || look.width_px < 320 || look.height_px < 240 ||
+      look.width_px > 7680 || look.height_px > 4320 || look.width_px % 2 != 0 || look.height_px % 2 != 0)
     throw UserError(fmt::format("--size {}: is no size; give WxH, both even, from 320x240 to 7680x4320", words));
 }
 

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "clients/doors/tracked_frame.hpp"
 #include "core/base/error.hpp"
 #include "core/base/pose.hpp"
 #include "core/base/say.hpp"

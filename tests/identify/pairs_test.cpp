@@ -1,0 +1,53 @@
+// Effects of two covariates of which a search sees one first: it takes the other as an amplitude of what it has found.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "clients/identify/search/search.hpp"
+#include "tests/identify/small_set.hpp"
+
+namespace kilotwin {
+namespace {
+
+truth::Scene large(void (*push)(const truth::Situation&, truth::Push&)) {
+  truth::Effect one;
+  one.name = "effect";
+  one.push = push;
+  truth::Scene scene = small({one});
+  scene.robots = 20;
+  scene.train_runs = 3;
+  scene.train_s = 200;
+  return scene;
+}
+
+/// The effects that the search finds.
+std::string found_in(const truth::Scene& scene) {
+  auto&& [set, fitter, base] = BaseFit(scene);
+  const identify::Search found = identify::search(fitter, base, identify::WorkLog({}));
+  std::string names;
+  for (const identify::Term& term : found.fit.model.terms) names += (names.empty() ? "" : ", ") + term.name;
+  return names;
+}
+
+TEST(Pairs, APatchThatActsOnOneWheelByItsMotorTime) {
+  const truth::Scene scene = large([](const truth::Situation& at, truth::Push& push) {
+    const double wave = 0.5 + 0.5 * std::sin((at.driven_s.left + at.driven_s.right) / 14);
+    push.gain.left *= 1 + 0.35 * wave / (1 + std::pow(std::hypot(at.disc.x, at.disc.y - 100) / 200, 6));
+  });
+  EXPECT_EQ(found_in(scene), "speed-by-position-and-motor-time");
+}
+
+TEST(Pairs, StartsAfterAStopByTheHeading) {
+  const truth::Scene scene = large([](const truth::Situation& at, truth::Push& push) {
+    if (at.before != truth::Motion::kStop) return;
+    const double gain = 1 - 0.55 * (0.5 + 0.5 * std::cos(at.heading_rad - 1)) * std::exp(-at.since_change_s / 3.5);
+    push.gain.left *= gain;
+    push.gain.right *= gain;
+  });
+  EXPECT_NE(found_in(scene).find("speed-by-history-and-heading-and-time-since-command"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace kilotwin
