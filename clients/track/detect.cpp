@@ -72,7 +72,8 @@ std::optional<double> common_radius(const cv::Mat& grey) {
   double best = 0;
   std::optional<double> radius;
   const double most = std::min(kMostRadius_px, 0.25 * std::min(grey.cols, grey.rows));
-  for (double rung = kLeastRadius_px; rung <= most; rung *= kRungs) {
+  for (int k = 0; kLeastRadius_px * std::pow(kRungs, k) <= most; ++k) {
+    const double rung = kLeastRadius_px * std::pow(kRungs, k);
     const std::vector<FittedCircle> circles =
         apart(only_covered(fit_all(grey, vote(grey, rung, kMostCandidates), kRungs - 1)));
     double evidence = 0;
@@ -231,6 +232,7 @@ std::vector<Detection> Detector::find(const cv::Mat& grey) {
   std::erase_if(circles, unlike);
   look_ = look;
   std::vector<Detection> found;
+  found.reserve(circles.size());
   for (const FittedCircle& circle : circles) found.push_back(detection_of(circle));
   std::sort(found.begin(), found.end(),
             [](const Detection& a, const Detection& b) { return a.disc.centre.x_px < b.disc.centre.x_px; });

@@ -79,11 +79,15 @@ class Overlaps {
   static constexpr int kPerRadius = 32;
   Overlaps() : table_(static_cast<std::size_t>(2 * kFalloffReach * kPerRadius) + 2) {
     constexpr double kStep = 0.04;
+    constexpr int kSteps = static_cast<int>(2 * kFalloffReach / kStep + 0.999);
     for (std::size_t i = 0; i < table_.size(); ++i) {
       const double apart = static_cast<double>(i) / kPerRadius;
-      for (double y = -kFalloffReach; y < kFalloffReach; y += kStep) {
-        for (double x = -kFalloffReach; x < kFalloffReach; x += kStep)
+      for (int row = 0; row < kSteps; ++row) {
+        const double y = -kFalloffReach + row * kStep;
+        for (int column = 0; column < kSteps; ++column) {
+          const double x = -kFalloffReach + column * kStep;
           table_[i] += kStep * kStep * falloff(std::hypot(x, y)) * falloff(std::hypot(x - apart, y));
+        }
       }
     }
   }
@@ -321,6 +325,7 @@ class Sources {
     }
     std::sort(order.begin(), order.end());
     std::vector<std::size_t> robots;
+    robots.reserve(order.size());
     for (const auto& [light, robot] : order) robots.push_back(robot);
     return robots;
   }

@@ -129,7 +129,7 @@ class RewrittenPicture : public Source {
 
 class Video : public Source {
  public:
-  Video(cv::VideoCapture capture, bool live, double rate_hz) : capture_(std::move(capture)), live_(live) {
+  Video(const cv::VideoCapture& capture, bool live, double rate_hz) : capture_(capture), live_(live) {
     const double stated = capture_.get(cv::CAP_PROP_FPS);
     rate_hz_ = stated > 0.1 && stated < 1000 ? stated : rate_hz;
   }

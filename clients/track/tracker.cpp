@@ -83,6 +83,7 @@ std::vector<Detection> PictureTracker::look(const cv::Mat& grey, double time_s) 
   }
   // Lost robots hide nothing.
   std::vector<Circle> known;
+  known.reserve(found.size());
   for (const Detection& detection : found) known.push_back(detection.disc);
   for (const Detection& detection : detector_.find_more(grey, next_strip(grey.size(), time_s), known))
     add(detection);

@@ -226,7 +226,7 @@ bool RecordedCurves::take_own() {
   }
   return each_new_state(
       own_values_, index_.states().size(), settled, [this](std::size_t number, const proto::StateRecord& read) {
-        const proto::StateRecord state = read;  // reading variables takes the reader's memory
+        const proto::StateRecord state = read;  // NOLINT: reading variables takes the reader's memory
         own_variables_.take(state.tick(), *own_);
         const double time_s = seconds(state.tick());
         own_observer_.add(time_s, recorder::values(state.x_mm()), recorder::values(state.y_mm()),

@@ -177,6 +177,7 @@ std::string RecordedRun::floors_at(std::int64_t tick) {
       newest.try_emplace(record->floor().environment(), record->floor());
   }
   std::vector<proto::FloorRecord> list;
+  list.reserve(newest.size());
   for (auto& [environment, floor] : newest) list.push_back(std::move(floor));
   return floors_text(list);
 }
@@ -322,6 +323,7 @@ std::vector<TrackedPlace> RecordedRun::places_at(std::int64_t tick) {
     }
   }
   std::vector<TrackedPlace> list;
+  list.reserve(places.size());
   for (const auto& [robot, place] : places) list.push_back(place);
   return list;
 }

@@ -110,11 +110,12 @@ json circles_of(const proto::Experiment& experiment) {
 json floor_of(const proto::FloorRecord& floor) {
   json circles = json::array();
   for (int i = 0; i < floor.circle_name_size(); ++i) {
-    circles.push_back({{"x", floor.circle_mm(3 * i)},
-                       {"y", floor.circle_mm(3 * i + 1)},
-                       {"radius", floor.circle_mm(3 * i + 2)},
-                       {"rgba", base64(floor.circle_rgba().substr(static_cast<std::size_t>(4 * i), 4))},
-                       {"name", floor.circle_name(i)}});
+    circles.push_back(
+        {{"x", floor.circle_mm(3 * i)},
+         {"y", floor.circle_mm(3 * i + 1)},
+         {"radius", floor.circle_mm(3 * i + 2)},
+         {"rgba", base64(floor.circle_rgba().substr(std::size_t{4} * static_cast<std::size_t>(i), 4))},
+         {"name", floor.circle_name(i)}});
   }
   return {
       {"columns", floor.columns()}, {"rows", floor.rows()}, {"rgba", base64(floor.rgba())}, {"circles", circles}};

@@ -52,7 +52,7 @@ std::unique_ptr<PluginHost> make_plugin_host(const EnvironmentSettings& setting,
     if (!std::filesystem::is_regular_file(file, ignored))
       throw UserError(file.string() + ": cannot be read; the run directory must hold the plugins of its manifest");
   }
-  return start_plugin_process(program, object, patience);
+  return start_plugin_process(program, object, std::move(patience));
 }
 
 }  // namespace kilotwin::ark

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstring>
+#include <utility>
 
 #include "core/base/error.hpp"
 #include "core/os/descriptor.hpp"
@@ -38,7 +39,7 @@ enum class Wait : std::uint8_t { kReady, kEnded, kTooLong };
 class PluginProcess final : public PluginHost {
  public:
   PluginProcess(const std::filesystem::path& program, const std::filesystem::path& object, PluginPatience patience)
-      : patience_(patience), process_(command_of(program, object)) {
+      : patience_(std::move(patience)), process_(command_of(program, object)) {
     theirs_.reset();
   }
 
@@ -202,7 +203,7 @@ class PluginProcess final : public PluginHost {
 
 std::unique_ptr<PluginHost> start_plugin_process(const std::filesystem::path& program,
                                                  const std::filesystem::path& object, PluginPatience patience) {
-  return std::make_unique<PluginProcess>(program, object, patience);
+  return std::make_unique<PluginProcess>(program, object, std::move(patience));
 }
 
 }  // namespace kilotwin::ark

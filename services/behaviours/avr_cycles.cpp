@@ -72,7 +72,7 @@ unsigned avr_cycles(std::string_view name, std::string_view operands) {
   constexpr unsigned kIndex = 12;
   constexpr long long kMostIndexed = 65535;
   if (name == "imulq" && operands.starts_with('$') &&
-      std::atoll(std::string(operands.substr(1)).c_str()) <= kMostIndexed)
+      std::strtoll(std::string(operands.substr(1)).c_str(), nullptr, 10) <= kMostIndexed)
     return kIndex;
   unsigned cycles = 2;
   for (const Cost& cost : kCosts) {

@@ -35,7 +35,7 @@ struct Compiler {
   [[nodiscard]] bool is_clang() const { return version.find("clang") != std::string::npos; }
   [[nodiscard]] int major_version() const {
     const std::size_t at = version.find("version ");
-    return at == std::string::npos ? 0 : std::atoi(version.c_str() + at + 8);
+    return at == std::string::npos ? 0 : static_cast<int>(std::strtol(version.c_str() + at + 8, nullptr, 10));
   }
 };
 
@@ -233,7 +233,7 @@ std::string counted_assembly(const Arguments& compiler, const fs::path& source, 
 /// The runtime as one object file, cached per compiler.
 fs::path runtime_object(const Compiler& compiler, const Arguments& includes, const fs::path& runtime,
                         const std::string& content) {
-  const fs::path kept = runtime / (sha256_hex(content) + ".o");
+  fs::path kept = runtime / (sha256_hex(content) + ".o");
   std::error_code error;
   if (fs::is_regular_file(kept, error)) return kept;
   Arguments compile{compiler.path};

@@ -29,7 +29,7 @@ fs::path unpacked_runtime(const fs::path& cache) {
       all.append(file.name).append(1, '\0').append(file.text).append(1, '\0');
     return sha256_hex(all);
   }();
-  const fs::path folder = cache / ("runtime-" + content_hash.substr(0, 16));
+  fs::path folder = cache / ("runtime-" + content_hash.substr(0, 16));
   for (const RuntimeFile& file : runtime_files()) {
     const fs::path path = folder / file.name;
     if (os::read_if_there(path) == file.text) continue;
@@ -116,7 +116,8 @@ std::optional<std::string> compiler_error(std::string_view line) {
     if (at == std::string_view::npos) continue;
     const std::string_view place = line.substr(0, at);
     std::string_view file = place;
-    if (drop_number(file) && drop_number(file)) {
+    const bool has_column = drop_number(file), has_line = has_column && drop_number(file);
+    if (has_line) {
       return std::string(place) + ": error: " + std::string(line.substr(at + mark.size()));
     }
   }

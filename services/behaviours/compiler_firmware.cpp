@@ -75,7 +75,7 @@ struct AvrToolchain {
 };
 
 fs::path AvrToolchain::boot_loader() const {
-  const fs::path kept = cache / "firmware" / ("boot-loader-" + sha256_hex(content).substr(0, 32) + ".bin");
+  fs::path kept = cache / "firmware" / ("boot-loader-" + sha256_hex(content).substr(0, 32) + ".bin");
   std::error_code error;
   if (fs::is_regular_file(kept, error)) return kept;
   const os::TemporaryFolder folder("boot-loader", cache / "firmware");

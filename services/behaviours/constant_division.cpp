@@ -45,7 +45,8 @@ Operands split(std::string_view text) {
 int register_of(std::string_view operand) {
   if (operand.size() < 3 || operand.front() != '%') return kNoRegister;
   operand.remove_prefix(1);
-  if (operand.front() == 'r' && operand[1] >= '0' && operand[1] <= '9') return std::atoi(operand.data() + 1);
+  if (operand.front() == 'r' && operand[1] >= '0' && operand[1] <= '9')
+    return static_cast<int>(std::strtol(operand.data() + 1, nullptr, 10));
   const bool is_lowest = operand.back() == 'l' && operand.size() == 3;  // dil
   if (operand.size() == 3 && !is_lowest) operand.remove_prefix(1);      // rax, eax
   constexpr std::array<std::string_view, 16> kNames{"ax", "al", "cx", "cl", "dx", "dl", "bx", "bl",

@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstring>
 #include <map>
+#include <system_error>
 
 #include "core/base/error.hpp"
 
@@ -22,7 +23,7 @@ void* pointer(std::uint64_t address) { return reinterpret_cast<void*>(address); 
 
 void protect(std::uint64_t address, std::uint64_t size, int protection) {
   if (size > 0 && mprotect(pointer(address), size, protection) != 0) {
-    throw RunError(std::string("memory for robots' programs: ") + std::strerror(errno));
+    throw RunError(std::string("memory for robots' programs: ") + std::generic_category().message(errno));
   }
 }
 
@@ -64,7 +65,7 @@ Slot::Slot(const ElfFile& file, std::uint64_t address)
     const int error = mapped == MAP_FAILED ? errno : EEXIST;
     if (mapped != MAP_FAILED) munmap(mapped, size_);
     if (error == EEXIST) throw RunError(kTaken);
-    throw RunError(std::string("memory for robots' programs: ") + std::strerror(error));
+    throw RunError(std::string("memory for robots' programs: ") + std::generic_category().message(error));
   }
   try {
     protect(stack_top_ - kStackOctets, kStackOctets, PROT_READ | PROT_WRITE);

@@ -139,7 +139,7 @@ bool is_top(const fs::path& folder) {
 
 /// Whether a folder is a home directory or a parent of one, which is too wide to search.
 bool is_wide(const fs::path& folder) {
-  const char* const home = std::getenv("HOME");
+  const char* const home = std::getenv("HOME");  // NOLINT(concurrency-mt-unsafe): nothing here changes it
   return std::distance(folder.begin(), folder.end()) < 3 || folder.parent_path() == "/home" ||
          (home != nullptr && folder == fs::path(home));
 }

@@ -230,7 +230,10 @@ std::vector<std::string> robot_warnings(const std::vector<fs::path>& sources, co
     static const std::regex kPlace(R"(^(.*?):(\d+):(\d+): )");
     std::smatch match;
     if (!std::regex_search(warning, match, kPlace)) return std::make_tuple(std::string(), 0, 0);
-    return std::make_tuple(match[1].str(), std::atoi(match[2].str().c_str()), std::atoi(match[3].str().c_str()));
+    const auto number = [&](std::size_t group) {
+      return static_cast<int>(std::strtol(match[group].str().c_str(), nullptr, 10));
+    };
+    return std::make_tuple(match[1].str(), number(2), number(3));
   };
   std::sort(result.begin(), result.end(), [&](const std::string& a, const std::string& b) {
     return std::make_pair(line_of(a), a) < std::make_pair(line_of(b), b);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace kilotwin::identify {
 namespace {
@@ -36,8 +37,8 @@ void FilterBank::take(const Sample& sample) {
     lost += 1;
   }
   log_likelihood_ += total_of(hypotheses_) - weight;
-  // Every hypothesis lost the track: the position is known, the heading is not.
-  if (lost > 0 && lost == static_cast<double>(hypotheses_.size())) return start(sample);
+  // Every hypothesis lost the track: the position is known, the heading may be another one.
+  if (lost > 0 && lost == static_cast<double>(hypotheses_.size())) return restart(sample);
   prune();
 }
 
@@ -47,11 +48,39 @@ void FilterBank::start(const Sample& sample) {
   const auto add = [&](double heading, double sd) {
     TrackFilter filter(model_, bias, view_.track->robot, view_.number);
     filter.start(sample, {}, heading, sd);
+    filter.stay_within_walls();
     hypotheses_.push_back({std::move(filter), 0});
   };
   if (TrackFilter::has_heading(sample)) return add(sample.heading_rad, std::sqrt(model_.noise.heading_rad2));
   constexpr int kHeadings = 18;
   for (int i = 0; i < kHeadings; ++i) add(2 * M_PI * i / kHeadings, M_PI / kHeadings);
+}
+
+void FilterBank::restart(const Sample& sample) {
+  // A push by another robot displaces and turns a robot. Else a wrong heading has lost the track.
+  constexpr double kOfAny = 0.3;
+  const std::vector<Hypothesis> before = std::exchange(hypotheses_, {});
+  const double total = total_of(before);
+  start(sample);
+  for (Hypothesis& h : hypotheses_) {
+    double density = 0, all = 0;
+    for (const Hypothesis& one : before) {
+      const Belief &belief = one.filter.belief(), &own = h.filter.belief();
+      const double variance = belief.covariance(2, 2);
+      const auto likely = [&](double heading_rad) {
+        const double apart = wrapped_angle(heading_rad - belief.mean[2]);
+        return std::exp(-apart * apart / (2 * variance));
+      };
+      double sum = 0;
+      for (const Hypothesis& other : hypotheses_) sum += likely(other.filter.belief().mean[2]);
+      const double weight = std::exp(one.log_weight - total);
+      density += weight * likely(own.mean[2]) / sum;
+      all += weight;
+    }
+    const double share = kOfAny / static_cast<double>(hypotheses_.size()) + (1 - kOfAny) * density / all;
+    // Weights that are no numbers know nothing.
+    h.log_weight = std::isfinite(share) ? std::log(share) : 0;
+  }
 }
 
 void FilterBank::prune() {

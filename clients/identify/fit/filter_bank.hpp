@@ -1,5 +1,6 @@
 /// Causal state estimate of one robot: a bank of extended Kalman filters (a Gaussian sum), one per hypothesis of
-/// the initial heading. Without measured headings, 18 evenly spaced hypotheses start and are pruned and merged.
+/// the initial heading. Without measured headings, 18 evenly spaced hypotheses start and are pruned and merged. They start
+/// again where all have lost the track.
 #pragma once
 
 #include <vector>
@@ -31,6 +32,8 @@ class FilterBank {
  private:
   void take(const Sample&);
   void start(const Sample&);
+  /// Starts anew where the track was lost, at any heading, most likely near the present ones.
+  void restart(const Sample&);
   void prune();
 
   const MotionModel& model_;

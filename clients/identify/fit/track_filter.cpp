@@ -278,6 +278,18 @@ double TrackFilter::predicted_variance_mm2(double time_s, const CommandState& co
   return s(0, 0) + s(1, 1);
 }
 
+void TrackFilter::keep_within_walls(Eigen::Vector3d& difference) const {
+  const Walls& walls = model_->walls;
+  const double beyond_mm = 2 + 3 * std::sqrt(model_->noise.position_mm2);
+  const auto keep = [&](Eigen::Index axis, double centre_mm, double low_mm, double high_mm) {
+    const double at_mm = centre_mm + difference[axis];
+    if (at_mm > high_mm + beyond_mm) difference[axis] = high_mm - centre_mm;
+    if (at_mm < low_mm - beyond_mm) difference[axis] = low_mm - centre_mm;
+  };
+  keep(0, belief_.centre_x_mm(), walls.x_low_mm, walls.x_high_mm);
+  keep(1, belief_.centre_y_mm(), walls.y_low_mm, walls.y_high_mm);
+}
+
 Innovation TrackFilter::update(const Sample& sample, const CommandState& commands) {
   Innovation out;
   out.size = has_heading(sample) ? 3 : 2;
@@ -287,6 +299,7 @@ Innovation TrackFilter::update(const Sample& sample, const CommandState& command
   out.jacobian = jacobian(at);
   out.difference << sample.x_mm - seen[0], sample.y_mm - seen[1],
       out.size == 3 ? wrapped_angle(sample.heading_rad - seen[2]) : 0.0;
+  if (within_walls_ && measures_) keep_within_walls(out.difference);
   if (out.size == 2) out.jacobian.row(2).setZero();
   const Noise& noise = model_->noise;
   const Eigen::Matrix<double, 5, 3> ph = belief_.covariance.leftCols<3>() * out.jacobian.transpose();

@@ -93,6 +93,9 @@ class TrackFilter {
     spell_unsure_ = unsure;
   }
   Innovation update(const Sample&, const CommandState& commands);
+  /// From now on, a camera map that shows the disc centre clearly beyond a wall counts as wrong there: few data fix it along the walls,
+  /// and robots that push against them are left out of its fit. Not for fits of walls, which such places contradict.
+  void stay_within_walls() { within_walls_ = !model_->walls_uncertain; }
 
   [[nodiscard]] const Belief& belief() const { return belief_; }
   [[nodiscard]] Belief& belief() { return belief_; }
@@ -112,6 +115,7 @@ class TrackFilter {
   [[nodiscard]] Eigen::Matrix3d jacobian(const Situation&) const;
   void apply_spells(StepRecord&) const;
   void propagate_covariance(const StepRecord&);
+  void keep_within_walls(Eigen::Vector3d& difference) const;
 
   const MotionModel* model_;
   BlockSums sums_;
@@ -121,6 +125,7 @@ class TrackFilter {
   bool measures_;
   bool forecasting_ = false;
   bool at_boundary_ = false;
+  bool within_walls_ = false;
   double spell_share_ = 0, spell_variance_s_ = 0;
   bool spell_unsure_ = false;
 };

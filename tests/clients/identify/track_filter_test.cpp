@@ -59,6 +59,83 @@ TEST(TrackFilter, AnUnmeasuredHeadingKeepsItsInitialValue) {
   EXPECT_NEAR(filter.expected(2, {})[1], sample.y_mm, 0.01);
 }
 
+/// A track without headings of a robot that drives straight at the model's speed.
+MeasuredSet straight_track(const MotionModel& model, double heading_rad, double pushed_at_s, double pushed_mm) {
+  MeasuredSet set;
+  Track& track = set.runs.emplace_back(identify::Run{"r", {}}).tracks.emplace_back();
+  track.commands = {{-1e300, Motion::kStraight}};
+  for (double t = 0; t < 40; t += 0.5) {
+    const double way_mm = model.base.straight_mm_s * t, aside_mm = t >= pushed_at_s ? pushed_mm : 0;
+    track.samples.push_back({t, way_mm * std::cos(heading_rad) - aside_mm * std::sin(heading_rad),
+                             way_mm * std::sin(heading_rad) + aside_mm * std::cos(heading_rad), std::nan("")});
+  }
+  return set;
+}
+
+/// The weight of hypotheses within 0.6 rad of a heading.
+double weight_near(const FilterBank& bank, double heading_rad) {
+  constexpr double kNear_rad = 0.6;
+  double near = 0, all = 0;
+  for (const FilterBank::Hypothesis& h : bank.hypotheses()) {
+    const double weight = std::exp(h.log_weight);
+    all += weight;
+    if (std::abs(wrapped_angle(h.filter.belief().mean[2] - heading_rad)) < kNear_rad) near += weight;
+  }
+  return near / all;
+}
+
+TEST(FilterBank, APushLeavesTheHeadingLikely) {
+  constexpr double kHeading_rad = 0.7, kPushed_s = 20;
+  MotionModel model;
+  model.robots[0] = {Eigen::Vector2d::Zero(), 1e-4 * Eigen::Matrix2d::Identity()};
+  const MeasuredSet set = straight_track(model, kHeading_rad, kPushed_s, 60);
+  const PreparedSet prepared(set);
+  FilterBank bank(model, prepared.views().front());
+  bank.advance_to(kPushed_s - 0.5);
+  EXPECT_EQ(bank.hypotheses().size(), 1u);
+  EXPECT_GT(weight_near(bank, kHeading_rad), 0.99);
+  // The track is lost after some samples: all headings are possible, the one so far is the likeliest.
+  double restarted_s = 0;
+  for (double t = kPushed_s; t < 30 && restarted_s == 0; t += 0.5) {
+    bank.advance_to(t);
+    if (bank.hypotheses().size() > 9) restarted_s = t;
+  }
+  ASSERT_GT(restarted_s, 0);
+  EXPECT_GT(weight_near(bank, kHeading_rad), 0.6);
+  EXPECT_GT(weight_near(bank, kHeading_rad + M_PI), 0.01);
+  bank.advance_to(39);
+  EXPECT_GT(weight_near(bank, kHeading_rad), 0.99);
+}
+
+TEST(FilterBank, ACameraMapThatShowsRobotsBeyondAWallIsWrongThere) {
+  // By the map, robots are 12 mm further right than they are: beyond the wall along which this one slides.
+  constexpr double kHeading_rad = 0.5, kWall_mm = 200;
+  MotionModel model;
+  model.base.ahead_mm = 0;
+  model.walls.x_high_mm = kWall_mm;
+  model.robots[0] = {Eigen::Vector2d::Zero(), 1e-4 * Eigen::Matrix2d::Identity()};
+  model.terms.push_back({"camera",
+                         {{Target::kMeasuredX, Basis{}, kAlways}},
+                         Eigen::VectorXd::Constant(1, -12),
+                         Eigen::VectorXd::Ones(1)});
+  MeasuredSet set;
+  Track& track = set.runs.emplace_back(identify::Run{"r", {}}).tracks.emplace_back();
+  track.commands = {{-1e300, Motion::kStraight}};
+  const double ahead_mm = model.base.centre_mm * std::cos(kHeading_rad);
+  for (double t = 0; t < 25; t += 0.5) {
+    const double way_mm = model.base.straight_mm_s * t;
+    track.samples.push_back({t, std::min(100 + way_mm * std::cos(kHeading_rad), kWall_mm - ahead_mm),
+                             way_mm * std::sin(kHeading_rad), std::nan("")});
+  }
+  const PreparedSet prepared(set);
+  FilterBank bank(model, prepared.views().front());
+  bank.advance_to(25);
+  EXPECT_EQ(bank.hypotheses().size(), 1u);  // not lost
+  const Belief& belief = bank.hypotheses().front().filter.belief();
+  EXPECT_NEAR(belief.mean[2], kHeading_rad, 0.2);
+  EXPECT_NEAR(belief.centre_x_mm(), kWall_mm, 3);
+}
+
 TEST(FilterBank, KeepsAHypothesisIfNoWeightIsFinite) {
   MeasuredSet set;
   Track& track = set.runs.emplace_back(identify::Run{"r", {}}).tracks.emplace_back();
