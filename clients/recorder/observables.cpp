@@ -165,6 +165,7 @@ std::vector<ObservableCurves> observe(Reader& recording, std::vector<RobotsObser
     }
   }
   std::vector<ObservableCurves> curves;
+  curves.reserve(observers.size());
   for (RobotsObserver& observer : observers) curves.push_back(observer.curves());
   return curves;
 }

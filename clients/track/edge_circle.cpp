@@ -106,8 +106,9 @@ EdgePoint edge_on(const Patch& patch, const Circle& circle, const Ray& ray, doub
   // The rise over a span of some 0.2 radii: what the edge of a disc makes, blurred as it may be.
   const int half = std::max(1, static_cast<int>(std::lround(0.09 * r / step)));
   const auto rise_at = [&](int i) {
-    return static_cast<double>(values[static_cast<std::size_t>(i + half)]) -
-           static_cast<double>(values[static_cast<std::size_t>(i - half)]);
+    const int before = i - half, after = i + half;
+    return static_cast<double>(values[static_cast<std::size_t>(after)]) -
+           static_cast<double>(values[static_cast<std::size_t>(before)]);
   };
   EdgePoint found;
   int best = -1;

@@ -79,7 +79,10 @@ Spot brightest(const Light& light, const Circle& disc) {
   const double window = window_of(light, disc);
   const int half = std::max(1, cvRound(0.85 * window));
   const std::vector<double> sums = summed(light);
-  const auto at = [&](int x, int y) { return sums[static_cast<std::size_t>(y * (light.columns + 1) + x)]; };
+  const auto at = [&](int x, int y) {
+    const int place = y * (light.columns + 1) + x;
+    return sums[static_cast<std::size_t>(place)];
+  };
   double most = 0;
   int best_x = -1, best_y = -1;
   for (int y = 0; y < light.rows; ++y) {

@@ -96,12 +96,12 @@ OdeWorld::OdeWorld(OdeWorld&&) noexcept = default;
 
 void OdeWorld::clear() {
   dJointGroupEmpty(handles_->contacts);
-  for (const dBodyID body : handles_->bodies) dBodyDestroy(body);
+  for (auto* const body : handles_->bodies) dBodyDestroy(body);
   handles_->bodies.clear();
 }
 
 std::uint32_t OdeWorld::add(const Inertia& inertia, const RigidState& state) {
-  const dBodyID body = dBodyCreate(handles_->world);
+  auto* const body = dBodyCreate(handles_->world);
   dMass mass;
   const Vector3& moment = inertia.moment_g_mm2;
   dMassSetParameters(&mass, inertia.mass_g, 0, 0, 0, moment[0], moment[1], moment[2], inertia.product_xy_g_mm2, 0,
@@ -140,8 +140,8 @@ void OdeWorld::add(const TouchPoint& touch) {
   } else {
     contact.geom.depth = -touch.gap_mm;
   }
-  const dJointID joint = dJointCreateContact(handles_->world, handles_->contacts, &contact);
-  const dBodyID other = touch.other == TouchPoint::kStanding ? nullptr : handles_->bodies[touch.other];
+  auto* const joint = dJointCreateContact(handles_->world, handles_->contacts, &contact);
+  auto* const other = touch.other == TouchPoint::kStanding ? nullptr : handles_->bodies[touch.other];
   dJointAttach(joint, handles_->bodies[touch.body], other);
 }
 
@@ -162,7 +162,7 @@ bool OdeWorld::step(Solver solver, std::uint64_t seed, bool pushes) {
 }
 
 void OdeWorld::read(std::uint32_t body, RigidState& state) const {
-  const dBodyID id = handles_->bodies[body];
+  auto* const id = handles_->bodies[body];
   const dReal *position = dBodyGetPosition(id), *rotation = dBodyGetQuaternion(id),
               *velocity = dBodyGetLinearVel(id), *spin = dBodyGetAngularVel(id);
   for (std::size_t k = 0; k < 3; ++k) {

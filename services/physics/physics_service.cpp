@@ -10,6 +10,7 @@ namespace {
 
 std::vector<FederateId> federates_of(const RunPlan& plan, const std::vector<PartitionId>& partitions) {
   std::vector<FederateId> result;
+  result.reserve(partitions.size());
   for (const PartitionId p : partitions) result.push_back(plan.physics(p));
   return result;
 }
