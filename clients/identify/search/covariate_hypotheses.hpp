@@ -15,6 +15,8 @@ std::vector<Eigen::Index> add_time_hypotheses(DictionaryBuilder&, const Extent&)
 /// Returns the first columns of the drift along x and along y.
 std::vector<Eigen::Index> add_place_hypotheses(DictionaryBuilder&, const Extent&);
 void add_heading_hypotheses(DictionaryBuilder&, const Extent&);
+/// Effects on one wheel alone (wheel_hypotheses.cpp).
+void add_wheel_hypotheses(DictionaryBuilder&, const Extent&);
 /// A constant drift, alone and together with drifts over time and over place.
 void add_drift_hypotheses(DictionaryBuilder&, const Extent&, const std::vector<Eigen::Index>& in_time,
                           const std::vector<Eigen::Index>& in_place);

@@ -40,6 +40,14 @@ Part command_part(const Extent& e) {
   if (e.has_turns) moving.insert(moving.end(), {2, 3});
   return {"command", keyed(Shape::kTable, Covariate::kCommand, moving)};
 }
+/// The command before the present one.
+Part previous_part(const Extent& e) {
+  std::vector<double> before{kNoCommand};
+  if (e.has_stop) before.push_back(0);
+  if (e.has_straight) before.push_back(1);
+  if (e.has_turns) before.insert(before.end(), {2, 3});
+  return {"history", keyed(Shape::kTable, Covariate::kPreviousCommand, before)};
+}
 Part robot_part(const Extent& e) {
   return {"robot", keyed(Shape::kTable, Covariate::kRobot, {e.robots.begin(), e.robots.end()})};
 }
@@ -125,7 +133,7 @@ void add_other_pairs(DictionaryBuilder& make, const Extent& extent) {
   for (const TargetGroup* group : {&kSpeed, &kTurning}) {
     std::vector<Part> parts{time_part(extent, 6), place_part(extent, 3), heading_part(2), since_part(extent, 4)};
     if (extent.has_stop) parts.push_back(motor_part(extent, 5));
-    if (commands) parts.push_back(command_part(extent));
+    if (commands) parts.insert(parts.end(), {command_part(extent), previous_part(extent)});
     for (std::size_t i = 0; i < parts.size(); ++i)
       for (std::size_t j = i + 1; j < parts.size(); ++j)
         // Maps over time have a family of their own.
@@ -142,7 +150,7 @@ void add_pairs_of_drifts(DictionaryBuilder& make, const Extent& extent) {
   for (const TargetGroup* group : {&kWorld, &kSlip}) {
     std::vector<Part> parts{time_part(extent, 4), place_part(extent, 2), since_part(extent, 3)};
     if (extent.has_stop) parts.push_back(motor_part(extent, 3));
-    if (commands) parts.push_back(command_part(extent));
+    if (commands) parts.insert(parts.end(), {command_part(extent), previous_part(extent)});
     if (extent.neighbours) parts.push_back(nearest_part(2));
     for (std::size_t i = 0; i < parts.size(); ++i)
       for (std::size_t j = i + 1; j < parts.size(); ++j)

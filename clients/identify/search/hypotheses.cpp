@@ -64,6 +64,7 @@ Dictionary dictionary_of(const Extent& extent, const std::vector<Term>& found) {
   add_motor_time_hypotheses(make, extent);
   const auto drift_in_place = add_place_hypotheses(make, extent);
   add_heading_hypotheses(make, extent);
+  add_wheel_hypotheses(make, extent);
   add_drift_hypotheses(make, extent, drift_in_time, drift_in_place);
   add_command_hypotheses(make, extent);
   add_neighbour_hypotheses(make, extent);
