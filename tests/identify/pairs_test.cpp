@@ -1,4 +1,5 @@
-// Effects of two covariates of which a search sees one first: it takes the other as an amplitude of what it has found.
+// Effects of two covariates of which a search sees one first: it takes the other as an amplitude of what it has found. Effects on one
+// wheel, and drifts after commands.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -47,6 +48,20 @@ TEST(Pairs, StartsAfterAStopByTheHeading) {
     push.gain.right *= gain;
   });
   EXPECT_NE(found_in(scene).find("speed-by-history-and-heading-and-time-since-command"), std::string::npos);
+}
+
+TEST(Wheels, OneThatGainsSpeedInARun) {
+  const truth::Scene scene =
+      large([](const truth::Situation& at, truth::Push& push) { push.gain.left *= 1 + 0.25 * at.time_s / 200; });
+  EXPECT_EQ(found_in(scene), "speed-by-time");
+}
+
+TEST(Drifts, AfterOneKindOfCommand) {
+  const truth::Scene scene = large([](const truth::Situation& at, truth::Push& push) {
+    if (at.driven() && at.before == truth::Motion::kRight)
+      push.drift_mm_s.x += 2.5 * std::exp(-at.since_change_s / 3);
+  });
+  EXPECT_EQ(found_in(scene), "drift-by-previous-command");
 }
 
 }  // namespace
