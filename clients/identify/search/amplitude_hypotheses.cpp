@@ -97,7 +97,8 @@ void put_in_order(std::string& name, std::vector<std::string>& words) {
 void of_known_and_more(DictionaryBuilder& make, const Extent& extent, const TargetGroup& group,
                        const Multiplied& known, std::uint8_t during) {
   if (known.words.empty()) return;
-  const auto beside = [&](const char* word, Factor factor, std::initializer_list<Eigen::Index> sizes) {
+  const auto beside = [&](const char* word, Factor factor, std::initializer_list<Eigen::Index> sizes,
+                          double choices = 1) {
     if (known.is_of(word)) return;
     Basis basis = known.basis;
     basis.factors.push_back(std::move(factor));
@@ -111,13 +112,16 @@ void of_known_and_more(DictionaryBuilder& make, const Extent& extent, const Targ
       name = "time-and-position";
     }
     put_in_order(name, words);
-    for (const Eigen::Index size : sizes) make.add(group, name, words, some(bases, 0, size));
+    for (const Eigen::Index size : sizes) make.add(group, name, words, some(bases, 0, size), choices);
   };
-  beside("time", over(Shape::kCosines, Covariate::kTime, 0, extent.duration_s, 16), {1, 2, 6, 16});
+  beside("time", over(Shape::kCosines, Covariate::kTime, 0, extent.duration_s, 6), {1, 2, 6});
   beside("position", plane(extent, 3), {1, 2, 9});
   beside("heading", over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 2), {2, 4});
+  // Motor time and time rise together. Unless the data tell them apart, time is the simpler one.
+  constexpr double kLikeTime = 20;
   if (extent.has_stop)
-    beside("motor_time", over(Shape::kCosines, Covariate::kMotorTimeSum, 0, extent.sum_s, 16), {1, 2, 6, 16});
+    beside("motor_time", over(Shape::kCosines, Covariate::kMotorTimeSum, 0, extent.sum_s, 16), {1, 2, 6, 16},
+           kLikeTime);
   Factor since = over(Shape::kCosines, Covariate::kSinceCommand, 0, extent.since_s, 5);
   since.warp = 1;
   beside("time_since_command", since, {1, 2, 5});

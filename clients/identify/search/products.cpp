@@ -205,6 +205,8 @@ std::vector<Factor> functions_of_pair(const Term& term) {
   constexpr double kShare = 0.8;  // of the sum of squares of the coefficients
   const std::optional<Pair> pair = pair_of(term);
   if (!pair || pair->one.of_two() || pair->other.of_two()) return {};
+  // Curves over what only rises stand for much else, as for a circle that grows.
+  if (only_rises(pair->one.axis) || only_rises(pair->other.axis)) return {};
   Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(pair->one.columns()),
                                                  static_cast<Eigen::Index>(pair->other.columns()));
   for (std::size_t k = 0; k < pair->at.size(); ++k)
