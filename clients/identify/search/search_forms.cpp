@@ -117,7 +117,8 @@ bool SearchLoop::may_be_part_of_circle(std::size_t t) const {
   return std::all_of(term.blocks.begin(), term.blocks.end(), [](const Block& block) {
     const std::vector<Factor>& factors = block.basis.factors;
     return std::all_of(factors.begin(), factors.end(), [&](const Factor& f) {
-      return is_of_place(f.axis) || only_rises(f.axis) || (f.axis.of == Covariate::kRobot && factors.size() > 1);
+      const bool of_some = f.axis.of == Covariate::kRobot || f.axis.of == Covariate::kCommand;
+      return is_of_place(f.axis) || only_rises(f.axis) || (of_some && factors.size() > 1);
     });
   });
 }
