@@ -75,7 +75,7 @@ bool BlockSums::lacks_key(const OfBlock& block, const Situation& s) {
   });
 }
 
-double BlockSums::sum(const OfBlock& block, const Situation& s, std::size_t wheel) {
+double BlockSums::of_block(const OfBlock& block, const Situation& s, std::size_t wheel) {
   for (const std::size_t f : block.factors) (void)evaluated(layout_->factors[f], s, wheel);
   return part(block, 0, block.coefficients, wheel);
 }

@@ -22,8 +22,8 @@ class BlockSums {
     ++instant_;
     for (const OfBlock& one : layout_->blocks) {
       if ((one.block->during >> static_cast<int>(s.commands.command) & 1) == 0 || lacks_key(one, s)) continue;
-      const double left = sum(one, s, 0);
-      take(*one.block, left, one.per_wheel ? sum(one, s, 1) : left);
+      const double left = of_block(one, s, 0);
+      take(*one.block, left, one.per_wheel ? of_block(one, s, 1) : left);
     }
   }
 
@@ -55,7 +55,7 @@ class BlockSums {
   /// The place of the factor's values at a wheel, evaluated if they are not there yet.
   std::size_t evaluated(const OfFactor&, const Situation&, std::size_t wheel);
   [[nodiscard]] bool lacks_key(const OfBlock&, const Situation&);
-  [[nodiscard]] double sum(const OfBlock&, const Situation&, std::size_t wheel);
+  [[nodiscard]] double of_block(const OfBlock&, const Situation&, std::size_t wheel);
   /// The sum over the columns of the block's factors from `f` on.
   [[nodiscard]] double part(const OfBlock&, std::size_t f, const double* coefficients, std::size_t wheel) const;
 

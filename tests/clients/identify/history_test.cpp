@@ -210,8 +210,8 @@ TEST(History, AnEffectIsTestedWithAmplitudesPerRobotAndCommand) {
   battery.coefficients = Eigen::Vector2d(-0.2, 0.05);
   battery.precision = Eigen::Vector2d(1, 1);
   const Dictionary without = dictionary_of(extent), with = dictionary_of(extent, {battery});
-  // Amplitudes per robot, per command, for nine cosines over the plane and two harmonics of the heading.
-  EXPECT_EQ(with.columns(), without.columns() + 3 + 3 + 9 + 4);
+  // Amplitudes per robot, command and previous command; over the plane, the heading, motor time, and time since the command.
+  EXPECT_EQ(with.columns(), without.columns() + 3 + 3 + 5 + 9 + 4 + 16 + 5);
   for (const auto& [covariate, word] : {std::pair{Covariate::kRobot, "robot"}, {Covariate::kCommand, "command"}}) {
     const Hypothesis* found = nullptr;
     for (std::size_t h = without.hypotheses.size(); h < with.hypotheses.size(); ++h) {
