@@ -2,78 +2,92 @@
 
 #include <algorithm>
 #include <cstring>
+#include <numeric>
 #include <utility>
 
 namespace kilotwin::identify {
 namespace {
 
-constexpr Eigen::Index kLanes = 8, kStrip = NeededProducts::kStrip, kColumns = NeededProducts::kPanel;
-static_assert(kStrip == 2 * kLanes && kColumns == kLanes);
-using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
+constexpr Eigen::Index kPanel = NeededProducts::kPanel;
 
-/// One strip of rows of `sums` by some columns, in registers. Unrolled by hand, since compilers keep the array in
-/// memory.
-template <Eigen::Index... column>
-inline __attribute__((always_inline)) void strip(const double* rows, Eigen::Index count, Eigen::Index n,
-                                                 double* sums, const double* by,
-                                                 std::integer_sequence<Eigen::Index, column...>) {
-  Lanes low[sizeof...(column)], high[sizeof...(column)];
-  (std::memcpy(&low[column], sums + column * n, sizeof(Lanes)), ...);
-  (std::memcpy(&high[column], sums + column * n + kLanes, sizeof(Lanes)), ...);
-  for (Eigen::Index k = 0; k < count; ++k, rows += n, by += n) {
-    Lanes a, b;
-    std::memcpy(&a, rows, sizeof(Lanes));
-    std::memcpy(&b, rows + kLanes, sizeof(Lanes));
-    ((low[column] += a * by[column], high[column] += b * by[column]), ...);
+/// Contents of a register of so many numbers. An alias in place of the typedef loses the size (GCC 12).
+template <int lanes> struct Register {
+  // NOLINTNEXTLINE(modernize-use-using)
+  typedef double Lanes __attribute__((vector_size(lanes * sizeof(double))));
+};
+
+/// Sums of the kPanel columns at `rows` by some columns of the panel at `by`, in 8 registers. `stride`: between columns of `sums`.
+/// Unrolled by hand, since compilers keep arrays in memory.
+template <int lanes, int... vector, int... sum>
+inline __attribute__((always_inline)) void add_tile(const double* rows, const double* by, Eigen::Index count,
+                                                    double* sums, Eigen::Index stride,
+                                                    std::integer_sequence<int, vector...>,
+                                                    std::integer_sequence<int, sum...>) {
+  using Lanes = typename Register<lanes>::Lanes;
+  constexpr int kVectors = sizeof...(vector);
+  static_assert(kVectors * lanes == kPanel);
+  Lanes kept[sizeof...(sum)], row[sizeof...(vector)];
+  const auto place = [=](int n) { return sums + n / kVectors * stride + n % kVectors * lanes; };
+  (std::memcpy(&kept[sum], place(sum), sizeof(Lanes)), ...);
+  for (Eigen::Index k = 0; k < count; ++k, rows += kPanel, by += kPanel) {
+    (std::memcpy(&row[vector], rows + vector * lanes, sizeof(Lanes)), ...);
+    ((kept[sum] += row[sum % kVectors] * by[sum / kVectors]), ...);
   }
-  (std::memcpy(sums + column * n, &low[column], sizeof(Lanes)), ...);
-  (std::memcpy(sums + column * n + kLanes, &high[column], sizeof(Lanes)), ...);
+  (std::memcpy(place(sum), &kept[sum], sizeof(Lanes)), ...);
 }
 
-/// Some rows of `sums` by the columns of a panel, which lie in the lanes.
-template <Eigen::Index... row>
-inline __attribute__((always_inline)) void single_rows(const double* rows, Eigen::Index count, Eigen::Index n,
-                                                       double* sums, const double* by,
-                                                       std::integer_sequence<Eigen::Index, row...>) {
-  Lanes sum[sizeof...(row)];
-  for (Eigen::Index c = 0; c < kColumns; ++c) ((sum[row][c] = sums[c * n + row]), ...);
-  for (Eigen::Index k = 0; k < count; ++k, rows += n, by += n) {
-    Lanes panel;
-    std::memcpy(&panel, by, sizeof(Lanes));
-    ((sum[row] += panel * rows[row]), ...);
-  }
-  for (Eigen::Index c = 0; c < kColumns; ++c) ((sums[c * n + row] = sum[row][c]), ...);
+/// All sums of two panels.
+template <int lanes>
+inline __attribute__((always_inline)) void add_panels(const double* rows, const double* by, Eigen::Index count,
+                                                      double* sums, Eigen::Index stride) {
+  constexpr int kSums = 8, kVectors = kPanel / lanes, kColumns = kSums / kVectors;
+  for (Eigen::Index c = 0; c < kPanel; c += kColumns)
+    add_tile<lanes>(rows, by + c, count, sums + c * stride, stride, std::make_integer_sequence<int, kVectors>(),
+                    std::make_integer_sequence<int, kSums>());
 }
 
-inline __attribute__((always_inline)) void add(const double* rows, Eigen::Index count, Eigen::Index n,
+/// The columns panel by panel, those of a panel beside each other, filled up with zeros. Otherwise each row of a panel would lie in a
+/// memory page of its own.
+const std::vector<double>& in_panels(const double* rows, Eigen::Index count, Eigen::Index n) {
+  thread_local std::vector<double> packed;
+  const Eigen::Index panels = (n + kPanel - 1) / kPanel;
+  packed.assign(static_cast<std::size_t>(panels * count * kPanel), 0);
+  for (Eigen::Index k = 0; k < count; ++k)
+    for (Eigen::Index p = 0; p < panels; ++p)
+      std::copy_n(rows + k * n + p * kPanel, std::min(kPanel, n - p * kPanel),
+                  packed.data() + (p * count + k) * kPanel);
+  return packed;
+}
+
+template <int lanes>
+inline __attribute__((always_inline)) void add(const double* panels, Eigen::Index count, Eigen::Index n,
                                                const NeededProducts& needed, double* sums) {
-  using std::make_integer_sequence;
-  for (Eigen::Index j = 0; j + kColumns <= n; j += kColumns) {
-    double* const panel = sums + j * n;
-    for (const Eigen::Index i : needed.strips(j / kColumns))
-      strip(rows + i, count, n, panel + i, rows + j, make_integer_sequence<Eigen::Index, kColumns>());
-    // The rows after the last whole strip.
-    Eigen::Index i = n - (n - j) % kStrip;
-    for (; i + 4 <= n; i += 4)
-      single_rows(rows + i, count, n, panel + i, rows + j, make_integer_sequence<Eigen::Index, 4>());
-    for (; i < n; ++i)
-      single_rows(rows + i, count, n, panel + i, rows + j, make_integer_sequence<Eigen::Index, 1>());
-  }
-  for (Eigen::Index c = n - n % kColumns; c < n; ++c) {
-    for (Eigen::Index i = c; i < n; ++i) {
-      double sum = sums[c * n + i];
-      for (Eigen::Index k = 0; k < count; ++k) sum += rows[k * n + i] * rows[k * n + c];
-      sums[c * n + i] = sum;
+  for (Eigen::Index j = 0; j * kPanel < n; ++j) {
+    const Eigen::Index columns = std::min(kPanel, n - j * kPanel);
+    for (const Eigen::Index i : needed.with(j)) {
+      const double *const rows = panels + i * count * kPanel, *const by = panels + j * count * kPanel;
+      double* const to = sums + j * kPanel * n + i * kPanel;
+      if ((i + 1) * kPanel <= n) {
+        add_panels<lanes>(rows, by, count, to, n);
+        continue;
+      }
+      // The last panel may have fewer columns.
+      const Eigen::Index rest = n - i * kPanel;
+      double own[kPanel * kPanel] = {};
+      for (Eigen::Index c = 0; c < columns; ++c) std::copy_n(to + c * n, rest, own + c * kPanel);
+      add_panels<lanes>(rows, by, count, own, kPanel);
+      for (Eigen::Index c = 0; c < columns; ++c) std::copy_n(own + c * kPanel, rest, to + c * n);
     }
   }
 }
 
 /// to = start + by[0] * from[0] + ... over `terms` rows of n numbers. `start` is `to` or 0.
-template <int terms, bool onto>
+template <int lanes, int terms, bool onto>
 inline __attribute__((always_inline)) void combine(const double* by, const double* from, Eigen::Index stride,
                                                    Eigen::Index n, double* to) {
+  using Lanes = typename Register<lanes>::Lanes;
   Eigen::Index i = 0;
-  for (; i + kLanes <= n; i += kLanes) {
+  for (; i + lanes <= n; i += lanes) {
     Lanes sum = {}, next;
     if (onto) std::memcpy(&sum, to + i, sizeof(Lanes));
     for (int k = 0; k < terms; ++k) {
@@ -98,16 +112,16 @@ struct Kernels {
   Combine put3, onto3, onto2, onto1;
 };
 
-#define KILOTWIN_KERNELS(name, instructions)                                                                    \
+#define KILOTWIN_KERNELS(name, lanes, instructions)                                                             \
   struct name {                                                                                                 \
-    instructions static void add(const double* rows, Eigen::Index count, Eigen::Index n,                        \
+    instructions static void add(const double* panels, Eigen::Index count, Eigen::Index n,                      \
                                  const NeededProducts& needed, double* sums) {                                  \
-      identify::add(rows, count, n, needed, sums);                                                              \
+      identify::add<lanes>(panels, count, n, needed, sums);                                                     \
     }                                                                                                           \
     template <int terms, bool onto>                                                                             \
     instructions static void combine(const double* by, const double* from, Eigen::Index stride, Eigen::Index n, \
                                      double* to) {                                                              \
-      identify::combine<terms, onto>(by, from, stride, n, to);                                                  \
+      identify::combine<lanes, terms, onto>(by, from, stride, n, to);                                           \
     }                                                                                                           \
     static constexpr Kernels kernels() {                                                                        \
       return {add, combine<3, false>, combine<3, true>, combine<2, true>, combine<1, true>};                    \
@@ -115,37 +129,40 @@ struct Kernels {
   }
 
 #if defined(__x86_64__)
-KILOTWIN_KERNELS(Avx512, __attribute__((target("avx512f"))));
-KILOTWIN_KERNELS(Avx2, __attribute__((target("avx2"))));
+KILOTWIN_KERNELS(Avx512, 8, __attribute__((target("avx512f"))));
+KILOTWIN_KERNELS(Avx2, 4, __attribute__((target("avx2"))));
 #endif
-KILOTWIN_KERNELS(Baseline, );
+KILOTWIN_KERNELS(Baseline, 2, );
 #undef KILOTWIN_KERNELS
 
-Kernels fastest() {
+/// Those of this machine, the slowest first, as InstructionSet.
+std::vector<Kernels> kernels_of_machine() {
+  std::vector<Kernels> all{Baseline::kernels()};
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx512f") != 0) return Avx512::kernels();
-  if (__builtin_cpu_supports("avx2") != 0) return Avx2::kernels();
+  if (__builtin_cpu_supports("avx2") != 0) all.push_back(Avx2::kernels());
+  if (__builtin_cpu_supports("avx512f") != 0) all.push_back(Avx512::kernels());
 #endif
-  return Baseline::kernels();
+  return all;
 }
-const Kernels kFastest = fastest();
+const std::vector<Kernels> kKernels = kernels_of_machine();
+const Kernels kFastest = kKernels.back();
 
 using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 }  // namespace
 
 NeededProducts::NeededProducts(Eigen::Index n) {
-  for (Eigen::Index j = 0; j + kPanel <= n; j += kPanel) {
-    std::vector<Eigen::Index>& strips = strips_.emplace_back();
-    for (Eigen::Index i = j; i + kStrip <= n; i += kStrip) strips.push_back(i);
+  const Eigen::Index panels = (n + kPanel - 1) / kPanel;
+  for (Eigen::Index j = 0; j < panels; ++j) {
+    std::vector<Eigen::Index>& with = with_.emplace_back(static_cast<std::size_t>(panels - j));
+    std::iota(with.begin(), with.end(), j);
   }
 }
 
 NeededProducts::NeededProducts(Eigen::Index n, const std::vector<std::vector<Eigen::Index>>& groups,
                                Eigen::Index first, Eigen::Index last) {
-  // Panels are needed with panels: those before and including the diagonal.
   const Eigen::Index panels = (n + kPanel - 1) / kPanel;
-  Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> with =
+  Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> needed =
       Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic>::Constant(panels, panels, false);
   for (const std::vector<Eigen::Index>& group : groups) {
     std::vector<Eigen::Index> own(group.size());
@@ -153,20 +170,24 @@ NeededProducts::NeededProducts(Eigen::Index n, const std::vector<std::vector<Eig
     std::sort(own.begin(), own.end());
     own.erase(std::unique(own.begin(), own.end()), own.end());
     for (const Eigen::Index a : own)
-      for (const Eigen::Index b : own) with(a, b) = true;
+      for (const Eigen::Index b : own) needed(a, b) = true;
   }
-  if (first > 0) with.leftCols((first - 1) / kPanel + 1).setConstant(true);
-  if (last > 0) with.bottomRows(panels - (n - last) / kPanel).setConstant(true);
-  for (Eigen::Index j = 0; j + kPanel <= n; j += kPanel) {
-    std::vector<Eigen::Index>& strips = strips_.emplace_back();
-    for (Eigen::Index i = j; i + kStrip <= n; i += kStrip)
-      if (with(i / kPanel, j / kPanel) || with(i / kPanel + 1, j / kPanel)) strips.push_back(i);
+  if (first > 0) needed.leftCols((first - 1) / kPanel + 1).setConstant(true);
+  if (last > 0) needed.bottomRows(panels - (n - last) / kPanel).setConstant(true);
+  for (Eigen::Index j = 0; j < panels; ++j) {
+    std::vector<Eigen::Index>& with = with_.emplace_back();
+    for (Eigen::Index i = j; i < panels; ++i)
+      if (needed(i, j)) with.push_back(i);
   }
 }
 
+std::size_t instruction_sets() { return kKernels.size(); }
+
 void add_products(const RowMajorMatrix& rows, Eigen::Index count, const NeededProducts& needed,
-                  Eigen::MatrixXd& sums) {
-  kFastest.add(rows.data(), count, rows.cols(), needed, sums.data());
+                  Eigen::MatrixXd& sums, std::optional<std::size_t> instruction_set) {
+  const Eigen::Index n = rows.cols();
+  const Kernels& kernels = instruction_set ? kKernels[*instruction_set] : kFastest;
+  kernels.add(in_panels(rows.data(), count, n).data(), count, n, needed, sums.data());
 }
 
 void put_combined(const Eigen::Matrix3d& by, const PoseRows& from, Eigen::Index count, double* to) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 namespace kilotwin::identify {
@@ -19,23 +20,25 @@ class NeededProducts {
   NeededProducts(Eigen::Index n, const std::vector<std::vector<Eigen::Index>>& groups, Eigen::Index first,
                  Eigen::Index last);
 
-  /// Columns that are multiplied at once.
+  /// Columns that are multiplied at once: a panel. The last panel may have fewer.
   static constexpr Eigen::Index kPanel = 8;
-  /// Strips of rows of `sums` that are computed at once.
-  static constexpr Eigen::Index kStrip = 16;
-  /// First rows of the needed strips of a panel, ascending: j, j + kStrip, ..., as far as whole strips fit; j: its first column.
-  [[nodiscard]] const std::vector<Eigen::Index>& strips(Eigen::Index panel) const {
-    return strips_[static_cast<std::size_t>(panel)];
+  /// The panels whose products with this panel are needed, from itself on, ascending.
+  [[nodiscard]] const std::vector<Eigen::Index>& with(Eigen::Index panel) const {
+    return with_[static_cast<std::size_t>(panel)];
   }
 
  private:
-  std::vector<std::vector<Eigen::Index>> strips_;
+  std::vector<std::vector<Eigen::Index>> with_;  ///< by panel
 };
 
 /// Adds rows' * rows of the first `count` rows to the lower triangle of `sums` (n x n; n: columns of `rows`).
 /// Leaves the part above the diagonal undefined, and further sums may be left as they are if they are not needed. Each sum runs
 /// over the rows in order and rounds after each product and each sum, so the result has the same bits on every instruction set.
-void add_products(const RowMajorMatrix& rows, Eigen::Index count, const NeededProducts&, Eigen::MatrixXd& sums);
+/// `instruction_set`: below instruction_sets(); the fastest if not given.
+void add_products(const RowMajorMatrix& rows, Eigen::Index count, const NeededProducts&, Eigen::MatrixXd& sums,
+                  std::optional<std::size_t> instruction_set = std::nullopt);
+/// Number of instruction sets of this machine for which there are kernels (SSE2, AVX2, AVX-512), the slowest first.
+[[nodiscard]] std::size_t instruction_sets();
 
 /// Derivatives of a pose (x, y, heading) by all columns.
 using PoseRows = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>;

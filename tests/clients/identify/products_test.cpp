@@ -1,4 +1,4 @@
-// Products equal those of the plain loop bit by bit, for all sizes around those of registers.
+// Products equal those of the plain loop bit by bit, for all sizes around those of registers, on all instruction sets of the machine.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,14 +16,19 @@ TEST(Products, EqualThePlainLoop) {
   };
   for (const Eigen::Index n : {1, 2, 7, 8, 15, 16, 17, 31, 36, 64, 101}) {
     for (const Eigen::Index count : {0, 1, 5, 96}) {
-      RowMajorMatrix rows = RowMajorMatrix::NullaryExpr(96, n, draw);
-      Eigen::MatrixXd sums = Eigen::MatrixXd::NullaryExpr(n, n, draw), plain = sums;
-      add_products(rows, count, NeededProducts(n), sums);
-      for (Eigen::Index j = 0; j < n; ++j) {
-        for (Eigen::Index i = j; i < n; ++i) {
+      const RowMajorMatrix rows = RowMajorMatrix::NullaryExpr(96, n, draw);
+      const Eigen::MatrixXd start = Eigen::MatrixXd::NullaryExpr(n, n, draw);
+      Eigen::MatrixXd plain = start;
+      for (Eigen::Index j = 0; j < n; ++j)
+        for (Eigen::Index i = j; i < n; ++i)
           for (Eigen::Index k = 0; k < count; ++k) plain(i, j) += rows(k, i) * rows(k, j);
-          ASSERT_EQ(sums(i, j), plain(i, j)) << n << " columns, " << count << " rows, at " << i << ", " << j;
-        }
+      for (std::size_t set = 0; set < instruction_sets(); ++set) {
+        Eigen::MatrixXd sums = start;
+        add_products(rows, count, NeededProducts(n), sums, set);
+        for (Eigen::Index j = 0; j < n; ++j)
+          for (Eigen::Index i = j; i < n; ++i)
+            ASSERT_EQ(sums(i, j), plain(i, j))
+                << n << " columns, " << count << " rows, instruction set " << set << ", at " << i << ", " << j;
       }
     }
   }
