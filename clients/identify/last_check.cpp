@@ -143,7 +143,8 @@ Judged without_useless(Findings& f, const Fitter& fitter, const Evaluation& choo
 FitState without_term(const Fitter& fitter, const FitState& fit, std::size_t term) {
   FitState less = fit;
   less.model.terms.erase(less.model.terms.begin() + static_cast<std::ptrdiff_t>(term));
-  fitter.fit(less, 1);
+  // The base speeds may have to make up for a large part of the term.
+  fitter.fit_until_settled(less);
   return less;
 }
 

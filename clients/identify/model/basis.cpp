@@ -184,6 +184,9 @@ std::vector<double> Factor::roughness() const {
   if (!known.empty()) return rough;
   if (shape == Shape::kCosines) {
     for (std::uint32_t k = 0; k < count; ++k) rough[k] = std::max(first + k, 1u);
+  } else if (shape == Shape::kTaper) {
+    // An effect at close range has high powers, too.
+    for (std::uint32_t k = 0; k < count; ++k) rough[k] = std::sqrt(1.0 + k);
   } else if (shape == Shape::kHarmonics || shape == Shape::kTravelling) {
     for (std::uint32_t k = 0; k < count; ++k) rough[2 * k] = rough[2 * k + 1] = first + k;
   } else if (shape == Shape::kPolynomials2) {

@@ -16,24 +16,33 @@ constexpr double kSettled = 1;
 /// Pruning threshold of a column: its prior sd times the root of its information.
 constexpr double kFaint = 0.03;
 
+/// Covariates that are 0 without neighbours. Most robots have none for most of the time, so that a curve which is not 0 there would
+/// be confounded with the base speeds.
+bool is_0_when_alone(const Axis& axis) {
+  return axis.of == Covariate::kNeighbours || axis.of == Covariate::kDensity;
+}
+
 }  // namespace
 
 Factor richer(Factor f) {
   if (!f.known.empty()) return f;
+  if (is_0_when_alone(f.axis) && (f.shape == Shape::kLinear || f.shape == Shape::kCosines)) {
+    f.shape = Shape::kLevelling;
+    f.points = {f.high / 16, f.high / 8, f.high / 4, f.high / 2, f.high, 2 * f.high};
+    return f;
+  }
   switch (f.shape) {
-    case Shape::kLinear: {
+    case Shape::kLinear:
       f.shape = Shape::kCosines;
       f.first = 1;
       f.count = 16;
       break;
-    }
     case Shape::kCosines:
       switch (f.axis.of) {
         case Covariate::kTime: f.count = 64; break;
         case Covariate::kX:
         case Covariate::kPointDistance:
         case Covariate::kY: f.count = 40; break;
-        case Covariate::kNeighbours: f.count = 8; break;
         case Covariate::kSinceCommand:
           f.count = 40;
           f.warp = 0.5;
