@@ -198,9 +198,9 @@ std::uint64_t seed_of(const Arguments& arguments, const std::string& name) {
 }
 
 void print_header() {
-  fmt::print("{:20} {:>8} {:>8} {:>8} {:>6} | {:>8} {:>8} {:>8} {:>6} | {:>6} {:>5} {:>5} {:>5} {:>7}  {}\n",
-             "scene", "before", "after", "oracle", "ratio", "from20s", "after", "oracle", "ratio", "named", "false",
-             "s", "cores", "told", "found");
+  fmt::print("{:20} {:>8} {:>8} {:>8} {:>6} | {:>8} {:>8} {:>8} {:>6} {:>6} | {:>6} {:>5} {:>5} {:>5} {:>7}  {}\n",
+             "scene", "before", "after", "oracle", "ratio", "from20s", "after", "oracle", "ratio", "median",
+             "named", "false", "s", "cores", "told", "found");
 }
 
 void print_row(const Verdict& v) {
@@ -209,11 +209,12 @@ void print_row(const Verdict& v) {
     return;
   }
   fmt::print(
-      "{:20} {:8.2f} {:8.2f} {:8.2f} {:6.3f} | {:8.2f} {:8.2f} {:8.2f} {:6.3f} | {:>6} {:5} {:5.0f} {:5.2f} {:>7}  "
+      "{:20} {:8.2f} {:8.2f} {:8.2f} {:6.3f} | {:8.2f} {:8.2f} {:8.2f} {:6.3f} {:6.3f} | {:>6} {:5} {:5.0f} "
+      "{:5.2f} {:>7}  "
       "{}{}{}{}\n",
       v.scene, v.before_mm, v.after_mm, v.oracle_mm, v.after_mm / v.oracle_mm, v.later_before_mm, v.later_after_mm,
-      v.later_oracle_mm, v.later_after_mm / v.later_oracle_mm, fmt::format("{}/{}", v.named, v.causes),
-      v.false_findings.size(), v.seconds, v.cpu_s / v.seconds,
+      v.later_oracle_mm, v.later_after_mm / v.later_oracle_mm, v.median_after_mm / v.median_oracle_mm,
+      fmt::format("{}/{}", v.named, v.causes), v.false_findings.size(), v.seconds, v.cpu_s / v.seconds,
       !v.unexplained.empty() ? "yes"
       : v.perhaps            ? "perhaps"
                              : "no",
@@ -290,7 +291,7 @@ int judge_nothing(const Arguments& arguments, const fs::path& folder) {
 int judge_random(const Arguments& arguments, const fs::path& folder) {
   struct Sums {
     int failed = 0, near_oracle = 0, silent = 0, named = 0, causes = 0, right = 0, found = 0;
-    std::vector<double> ratios, improvements;
+    std::vector<double> ratios, medians, improvements;
   } sums;
   std::mutex printing;
   print_header();
@@ -308,6 +309,7 @@ int judge_random(const Arguments& arguments, const fs::path& folder) {
           return;
         }
         sums.ratios.push_back(v.ratio());
+        sums.medians.push_back(v.median_after_mm / v.median_oracle_mm);
         sums.improvements.push_back(v.before_mm / v.after_mm);
         if (v.ratio() <= Verdict::kRatio)
           ++sums.near_oracle;
@@ -331,6 +333,10 @@ int judge_random(const Arguments& arguments, const fs::path& folder) {
   };
   fmt::print("error over the oracle's: median {:.3f}, 90 % of sets below {:.3f}, largest {:.3f}\n",
              quantile(sums.ratios, 0.5), quantile(sums.ratios, 0.9), quantile(sums.ratios, 1));
+  const auto near =
+      std::count_if(sums.medians.begin(), sums.medians.end(), [](double of) { return of <= Verdict::kRatio; });
+  fmt::print("median error at or below {:.2f} of the oracle's: {}\n", Verdict::kRatio,
+             share_in_words(static_cast<int>(near), sets));
   fmt::print("error of the base model over the identified one's: median {:.2f}\n",
              quantile(sums.improvements, 0.5));
   fmt::print("causes: recall {:.2f} ({} of {}), precision {:.2f} ({} of {}), F1 {:.2f}\n", recall, sums.named,

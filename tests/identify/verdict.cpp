@@ -11,6 +11,9 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <stdexcept>
+#include <vector>
+
+#include "core/stats/quantiles.hpp"
 
 namespace kilotwin::truth {
 namespace {
@@ -64,7 +67,7 @@ bool is(const Fault& fault, const json& found) {
 void judge_errors(const std::vector<Prediction>& oracle, const std::filesystem::path& file, Verdict& verdict) {
   const std::map<Key, Row> rows = read_rows(file);
   std::array<double, 6> sum{};
-  int later = 0;
+  std::vector<double> later_after_mm, later_oracle_mm;
   for (const Prediction& p : oracle) {
     const auto row = rows.find({std::to_string(p.run), p.robot, std::lround(p.time_s * 1000)});
     if (row == rows.end()) {
@@ -75,11 +78,19 @@ void judge_errors(const std::vector<Prediction>& oracle, const std::filesystem::
                                           square_distance(row->second.after, p.truth),
                                           square_distance(p.predicted, p.truth)};
     ++verdict.rows;
-    if (p.time_s >= 20) ++later;
+    if (p.time_s >= 20) {
+      later_after_mm.push_back(std::sqrt(errors[1]));
+      later_oracle_mm.push_back(std::sqrt(errors[2]));
+    }
     for (std::size_t k = 0; k < 3; ++k) {
       sum[k] += errors[k];
       if (p.time_s >= 20) sum[k + 3] += errors[k];
     }
+  }
+  const auto later = static_cast<int>(later_after_mm.size());
+  if (later > 0) {
+    verdict.median_after_mm = stats::nearest_quantile(later_after_mm, 0.5);
+    verdict.median_oracle_mm = stats::nearest_quantile(later_oracle_mm, 0.5);
   }
   const auto rms = [](double total, int count) { return std::sqrt(total / std::max(count, 1)); };
   verdict.before_mm = rms(sum[0], verdict.rows);

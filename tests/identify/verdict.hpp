@@ -16,6 +16,8 @@ struct Verdict {
   double before_mm = 0, after_mm = 0, oracle_mm = 0;
   /// The same from 20 s on: without headings, the direction after a single sample is unknown.
   double later_before_mm = 0, later_after_mm = 0, later_oracle_mm = 0;
+  /// Of the same rows the median errors. A few predictions made before a heading was known may decide about the means.
+  double median_after_mm = 0, median_oracle_mm = 0;
   int rows = 0, missing_rows = 0;
   int causes = 0, named = 0;                // true effects and faults, and the number of those named
   std::vector<std::string> unnamed;         // true effects and faults not named

@@ -58,6 +58,14 @@ TEST_F(VerdictTest, LetsTheRightAnswerPass) {
   EXPECT_TRUE(v.good());
 }
 
+TEST_F(VerdictTest, OneBadPredictionDoesNotMoveTheMedian) {
+  oracle_[5].predicted.y = 300;
+  const Verdict v = of(scenario("fatigue"), 9, 3.2, kFatigue);
+  EXPECT_GT(v.later_oracle_mm, 30);
+  EXPECT_NEAR(v.median_oracle_mm, 3, 1e-9);
+  EXPECT_NEAR(v.median_after_mm, 3.2, 1e-9);
+}
+
 TEST_F(VerdictTest, AnErrorTooLargeDoesNotPass) { EXPECT_FALSE(of(scenario("fatigue"), 9, 3.4, kFatigue).good()); }
 
 TEST_F(VerdictTest, WhatLooksAlikeDoesNotPass) {
