@@ -116,12 +116,12 @@ struct Kernels {
   struct name {                                                                                                 \
     instructions static void add(const double* panels, Eigen::Index count, Eigen::Index n,                      \
                                  const NeededProducts& needed, double* sums) {                                  \
-      identify::add<lanes>(panels, count, n, needed, sums);                                                     \
+      identify::add<(lanes)>(panels, count, n, needed, sums);                                                   \
     }                                                                                                           \
     template <int terms, bool onto>                                                                             \
     instructions static void combine(const double* by, const double* from, Eigen::Index stride, Eigen::Index n, \
                                      double* to) {                                                              \
-      identify::combine<lanes, terms, onto>(by, from, stride, n, to);                                           \
+      identify::combine<(lanes), terms, onto>(by, from, stride, n, to);                                         \
     }                                                                                                           \
     static constexpr Kernels kernels() {                                                                        \
       return {add, combine<3, false>, combine<3, true>, combine<2, true>, combine<1, true>};                    \
