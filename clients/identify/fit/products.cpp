@@ -112,6 +112,7 @@ struct Kernels {
   Combine put3, onto3, onto2, onto1;
 };
 
+// NOLINTBEGIN(bugprone-macro-parentheses): an attribute cannot stand in any
 #define KILOTWIN_KERNELS(name, lanes, instructions)                                                             \
   struct name {                                                                                                 \
     instructions static void add(const double* panels, Eigen::Index count, Eigen::Index n,                      \
@@ -134,6 +135,7 @@ KILOTWIN_KERNELS(Avx2, 4, __attribute__((target("avx2"))));
 #endif
 KILOTWIN_KERNELS(Baseline, 2, );
 #undef KILOTWIN_KERNELS
+// NOLINTEND(bugprone-macro-parentheses)
 
 /// Those of this machine, the slowest first, as InstructionSet.
 std::vector<Kernels> kernels_of_machine() {
