@@ -143,18 +143,8 @@ Judged without_useless(Findings& f, const Fitter& fitter, const Evaluation& choo
 FitState without_term(const Fitter& fitter, const FitState& fit, std::size_t term) {
   FitState less = fit;
   less.model.terms.erase(less.model.terms.begin() + static_cast<std::ptrdiff_t>(term));
-  double likelihood = fitter.fit_for_likelihood(less, 1);
-  // The base speeds may have to make up for a large part of the term. Then one pass is far from the end.
-  constexpr int kMostPasses = 6;
-  constexpr double kFar = 20;
-  for (int pass = 1; pass < kMostPasses; ++pass) {
-    FitState further = less;
-    const double found = fitter.fit_for_likelihood(further, 1);
-    // Negated, so that a likelihood that is no number is no rise.
-    if (!(found > likelihood + kFar)) break;
-    less = std::move(further);
-    likelihood = found;
-  }
+  // The base speeds may have to make up for a large part of the term.
+  fitter.fit_until_settled(less);
   return less;
 }
 
