@@ -137,7 +137,7 @@ KILOTWIN_KERNELS(Baseline, 2, );
 #undef KILOTWIN_KERNELS
 // NOLINTEND(bugprone-macro-parentheses)
 
-/// Those of this machine, the slowest first, as InstructionSet.
+/// Those of this machine, the slowest first, as instruction_sets() counts them.
 std::vector<Kernels> kernels_of_machine() {
   std::vector<Kernels> all{Baseline::kernels()};
 #if defined(__x86_64__)
