@@ -421,6 +421,8 @@ identification::Unexplained unexplained_of(const Unexplained& u) {
   out.set_systematic_mm(u.systematic_mm);
   out.set_share(u.share);
   out.set_expected_mm(u.expected_mm);
+  if (u.known_starts_mm) out.set_known_starts_mm(*u.known_starts_mm);
+  if (u.known_starts_expected_mm) out.set_known_starts_expected_mm(*u.known_starts_expected_mm);
   *out.mutable_repetitions_mm() = json_value(u.repetitions_mm);
   for (const Pattern& p : u.patterns) *out.add_patterns() = pattern_of(p);
   out.set_in_words(u.in_words);

@@ -59,8 +59,10 @@ void assess(Findings& f, const Fitter& fitter, const MeasuredSet& train, const M
   f.bounds = bounds_of(evaluation.set(), f.before.errors, f.after.errors);
   const FitState white = with_white_noise(fitter, f.found.fit);
   f.white = white.model.noise;
+  std::vector<Forecast> held_out = f.after.forecasts;
   if (gives_errors(f.held_out)) {
-    f.after.errors.expected_mm2 = evaluation.judge(white, reported).errors.expected_mm2;
+    held_out = with_expectations_of(evaluation.judge(white, reported).forecasts, std::move(held_out));
+    f.after.errors = errors_of(evaluation.set(), held_out);
     f.expected_mm = f.after.errors.expected_mm();
   } else {
     f.expected_mm =
@@ -69,10 +71,17 @@ void assess(Findings& f, const Fitter& fitter, const MeasuredSet& train, const M
   std::vector<std::pair<const MeasuredSet*, const std::vector<Forecast>*>> all{{&train, &fitted}};
   if (test != nullptr) all.emplace_back(test, &f.after.forecasts);
   f.replicates = replicates_of(all, times.horizon_s);
-  f.unexplained = find_unexplained(
-      gives_errors(f.held_out) ? evaluation.set() : train, fitted_windows(f.found.fit, fitted, times.horizon_s),
-      windows_of(f.after.tracks, f.after.forecasts, times.horizon_s), f.after.errors, f.bounds, f.replicates,
-      threads, {std::max(20.0, 2 * times.horizon_s), !f.numbering.anew()});
+  const std::vector<Forecast> known = from_known_starts(held_out);
+  std::optional<HeldOutErrors> known_starts;
+  if (known.size() < held_out.size()) {
+    const PredictionErrors errors = errors_of(evaluation.set(), known);
+    known_starts = HeldOutErrors{errors, bounds_of(evaluation.set(), errors, errors)};
+  }
+  f.unexplained = find_unexplained(gives_errors(f.held_out) ? evaluation.set() : train,
+                                   fitted_windows(f.found.fit, from_known_starts(fitted), times.horizon_s),
+                                   windows_of(f.after.tracks, known, times.horizon_s), {f.after.errors, f.bounds},
+                                   known_starts, f.replicates, threads,
+                                   {std::max(20.0, 2 * times.horizon_s), !f.numbering.anew()});
 }
 
 /// Errors over the horizon, if anything is held out.
@@ -151,12 +160,12 @@ Search found_by_search(const Fitter& fitter, const FitState& base, const Measure
   if (!options.find_effects) return found;
   const auto leaves_much = [&](const FitState& fit) {
     const std::vector<Forecast> all = forecast(fit.model, fit.tracks, times, Tracks::kFit, options.threads);
-    // Motion in contact is uncertain, and no effect.
-    const std::vector<Forecast> free = free_ones(fit.model, fit.tracks, all, options.horizon_s);
-    PredictionErrors errors = errors_of(train, free);
     const FitState white = with_white_noise(fitter, fit);
-    const std::vector<Forecast> sure = forecast(white.model, fit.tracks, times, Tracks::kFit, options.threads);
-    errors.expected_mm2 = errors_of(train, free_ones(fit.model, fit.tracks, sure, options.horizon_s)).expected_mm2;
+    const std::vector<Forecast> expected = forecast(white.model, fit.tracks, times, Tracks::kFit, options.threads);
+    // Motion in contact is uncertain, and no effect.
+    const std::vector<Forecast> free = from_known_starts(
+        free_ones(fit.model, fit.tracks, with_expectations_of(expected, all), options.horizon_s));
+    const PredictionErrors errors = errors_of(train, free);
     return leaves_systematic_error(train, windows_of(fit.tracks, free, options.horizon_s), errors, options.threads);
   };
   found = search(fitter, base, log, leaves_much);

@@ -40,6 +40,15 @@ struct ForecastTimes {
 [[nodiscard]] std::vector<Forecast> free_ones(const MotionModel&, const PreparedSet&, const std::vector<Forecast>&,
                                               double horizon_s);
 
+/// The forecasts of one model with the expected errors that another model has of the same tracks and times. Forecasts that the other
+/// lacks keep theirs.
+[[nodiscard]] std::vector<Forecast> with_expectations_of(const std::vector<Forecast>& other,
+                                                         std::vector<Forecast> forecasts);
+
+/// The forecasts that start where the model knows the robot: it expects at most three times its median error. Before a heading is
+/// known, errors are so large that they hide all others.
+[[nodiscard]] std::vector<Forecast> from_known_starts(const std::vector<Forecast>&);
+
 /// The sample nearest to a time, at most `reach_s` away; of two equally near ones the earlier. Null: none.
 [[nodiscard]] const Sample* sample_near(const Track&, double time_s, double reach_s);
 

@@ -18,34 +18,63 @@ constexpr double kBeyond = 1.15;
 constexpr double kShown = 0.02;
 constexpr std::size_t kMostPatterns = 6;
 
+/// One error beside what the model expects. `of`: of which forecasts, in words.
+struct Comparison {
+  double error_mm, expected_mm;
+  std::optional<Interval> interval;
+  const char* of;
+};
+
+std::vector<Comparison> comparisons_of(const HeldOutErrors& all, const std::optional<HeldOutErrors>& known_starts) {
+  std::vector<Comparison> out;
+  const auto add = [&](const HeldOutErrors& of, const char* words) {
+    if (of.errors.rows > 0)
+      out.push_back({of.errors.rmse_mm(), of.errors.expected_mm(),
+                     of.bounds ? std::optional(of.bounds->after) : std::nullopt, words});
+  };
+  add(all, "");
+  if (known_starts) add(*known_starts, " from known starts");
+  return out;
+}
+
 /// The error that one comparison leaves to explain.
 struct Gap {
   double systematic_mm = 0;
-  std::string evidence;
+  double error_mm = 0;  ///< of which it is a part
+  std::string of, evidence;
 };
 
-Gap largest_gap(const Unexplained& u, const std::optional<ErrorBounds>& bounds) {
+Gap largest_gap(const Unexplained& u, const std::vector<Comparison>& comparisons) {
   Gap largest;
-  const auto note = [&](double systematic_mm, std::string evidence) {
-    if (systematic_mm > largest.systematic_mm) largest = {systematic_mm, std::move(evidence)};
+  const auto share = [](double systematic_mm, double error_mm) {
+    return error_mm > 0 ? systematic_mm / error_mm : 0;
+  };
+  const auto note = [&](double systematic_mm, double error_mm, const char* of, std::string evidence) {
+    if (share(systematic_mm, error_mm) > share(largest.systematic_mm, largest.error_mm))
+      largest = {systematic_mm, error_mm, of, std::move(evidence)};
   };
   const double learned_mm = u.learner ? u.learner->predicted_mm() : 0;
-  // If something is learned, the error of these robots is systematic. Its size then needs no interval over other robots.
-  const auto beyond = [&](double floor_mm) {
-    return (bounds && bounds->after.low_mm > kBeyond * floor_mm) ||
-           (learned_mm > 0 && !u.learner->cross_validated && u.learner->error_low_mm > kBeyond * floor_mm);
-  };
-  const auto above = [&](double floor_mm) {
-    return std::sqrt(std::max(0.0, u.error_mm * u.error_mm - floor_mm * floor_mm));
-  };
-  if (u.expected_mm > 0 && beyond(u.expected_mm))
-    note(above(u.expected_mm), fmt::format("the model itself expects {:.2f} mm", u.expected_mm));
-  if (u.repetitions_mm && beyond(*u.repetitions_mm))
-    note(above(*u.repetitions_mm),
-         fmt::format("repetitions of the same commands differ by {:.2f} mm only", *u.repetitions_mm));
+  for (const Comparison& c : comparisons) {
+    // If something is learned, the error of these robots is systematic. Its size then needs no interval over other robots.
+    const auto beyond = [&](double floor_mm) {
+      return (c.interval && c.interval->low_mm > kBeyond * floor_mm) ||
+             (learned_mm > 0 && !u.learner->cross_validated && u.learner->error_low_mm > kBeyond * floor_mm);
+    };
+    const auto above = [&](double floor_mm) {
+      return std::sqrt(std::max(0.0, c.error_mm * c.error_mm - floor_mm * floor_mm));
+    };
+    if (c.expected_mm > 0 && beyond(c.expected_mm))
+      note(above(c.expected_mm), c.error_mm, c.of, fmt::format("the model itself expects {:.2f} mm", c.expected_mm));
+    if (u.repetitions_mm && beyond(*u.repetitions_mm))
+      note(above(*u.repetitions_mm), c.error_mm, c.of,
+           fmt::format("repetitions of the same commands differ by {:.2f} mm only", *u.repetitions_mm));
+  }
+  // Its windows are those from known starts.
+  const char* const of = comparisons.empty() ? "" : comparisons.back().of;
   if (learned_mm > 0)
-    note(learned_mm, fmt::format("a random forest over all covariates predicts that part of it{}",
-                                 u.learner->cross_validated ? ", in cross-validation" : ""));
+    note(learned_mm, u.learner->error_mm, of,
+         fmt::format("a random forest over all covariates predicts that part of it{}",
+                     u.learner->cross_validated ? ", in cross-validation" : ""));
   return largest;
 }
 
@@ -55,30 +84,33 @@ std::string words_of(const Pattern& p) {
   return fmt::format("{} ({:.0f} %)", fmt::join(names, " with "), 100 * p.share);
 }
 
-/// Whether the error exceeds the model's expectation or the difference of repetitions, whatever its uncertainty.
-bool exceeds_a_floor(const Unexplained& u) {
-  return (u.expected_mm > 0 && u.error_mm > kBeyond * u.expected_mm) ||
-         (u.repetitions_mm && u.error_mm > kBeyond * *u.repetitions_mm);
+/// The comparison in which the error exceeds the model's expectation or the difference of repetitions, whatever its uncertainty. Null: in
+/// none.
+const Comparison* exceeding(const Unexplained& u, const std::vector<Comparison>& comparisons) {
+  const auto found = std::find_if(comparisons.begin(), comparisons.end(), [&](const Comparison& c) {
+    return (c.expected_mm > 0 && c.error_mm > kBeyond * c.expected_mm) ||
+           (u.repetitions_mm && c.error_mm > kBeyond * *u.repetitions_mm);
+  });
+  return found == comparisons.end() ? nullptr : &*found;
 }
 
 /// How the error compares with what the model expects of itself and with repetitions, where no gap is beyond its uncertainty.
-std::string comparison_in_words(const Unexplained& u, const std::optional<ErrorBounds>& bounds) {
+std::string comparison_in_words(const Unexplained& u, const Comparison* exceeds) {
   if (u.error_mm == 0) return "No held-out data give an error that could be compared with what the model expects.";
-  const auto said = [&](const std::string& how) {
-    return fmt::format("The error of {:.2f} mm {}", u.error_mm, how);
-  };
-  if (!u.perhaps)
-    return said(u.expected_mm > 0 ? fmt::format("is near what the model expects ({:.2f} mm).", u.expected_mm)
-                                  : "is compared with no expectation of the model.");
+  if (exceeds == nullptr)
+    return fmt::format("The error of {:.2f} mm {}", u.error_mm,
+                       u.expected_mm > 0 ? fmt::format("is near what the model expects ({:.2f} mm).", u.expected_mm)
+                                         : "is compared with no expectation of the model.");
+  const Comparison& c = *exceeds;
   const std::string exceeded =
-      u.expected_mm > 0 && u.error_mm > kBeyond * u.expected_mm
-          ? fmt::format("exceeds the {:.2f} mm that the model expects", u.expected_mm)
-          : fmt::format("exceeds the {:.2f} mm by which repetitions of the same commands differ",
-                        *u.repetitions_mm);
-  return said(exceeded + ", but too few data are held out to be sure: " +
-              (bounds
-                   ? fmt::format("it is {:.2f} to {:.2f} mm (95 %).", bounds->after.low_mm, bounds->after.high_mm)
-                   : "they are one track."));
+      c.expected_mm > 0 && c.error_mm > kBeyond * c.expected_mm
+          ? fmt::format("exceeds the {:.2f} mm that the model expects", c.expected_mm)
+          : fmt::format("exceeds the {:.2f} mm by which repetitions of the same commands differ", *u.repetitions_mm);
+  return fmt::format("The error of {:.2f} mm{} {}, but too few data are held out to be sure: {}", c.error_mm, c.of,
+                     exceeded,
+                     c.interval ? fmt::format("it is {:.2f} to {:.2f} mm (95 %).", c.interval->low_mm,
+                                              c.interval->high_mm)
+                                : "they are one track.");
 }
 
 std::string variation_in_words(const std::vector<Pattern>& patterns) {
@@ -112,18 +144,15 @@ std::string odd_robot_in_words(const MeasuredSet& set, const PredictionErrors& e
                      largest_mm, largest_mm / median_mm);
 }
 
-std::string words_of(const Unexplained& u, const std::optional<ErrorBounds>& bounds, const std::string& evidence) {
+std::string words_of(const Unexplained& u, const Gap& gap, const Comparison* exceeds) {
   if (!u.large())
-    return comparison_in_words(u, bounds) + (u.perhaps ? variation_in_words(u.patterns) : "") +
+    return comparison_in_words(u, exceeds) + (u.perhaps ? variation_in_words(u.patterns) : "") +
            (u.learner ? " A random forest over all covariates predicts no large part of the error."
                       : " There are too few predictions for a random forest to look for a pattern in the error.");
-  const double error_mm = u.error_mm > 0 ? u.error_mm : u.learner->error_mm;
   return fmt::format(
-             "Of the prediction error of {:.2f} mm, {:.2f} mm are systematic and unexplained ({:.0f} % of the mean "
-             "square "
-             "error): "
-             "{}.",
-             error_mm, u.systematic_mm, 100 * u.share, evidence) +
+             "Of the prediction error of {:.2f} mm{}, {:.2f} mm are systematic and unexplained ({:.0f} % of the mean "
+             "square error): {}.",
+             gap.error_mm, gap.of, u.systematic_mm, 100 * u.share, gap.evidence) +
          variation_in_words(u.patterns);
 }
 
@@ -138,28 +167,32 @@ bool leaves_systematic_error(const MeasuredSet& set, const std::vector<Window>& 
 }
 
 Unexplained find_unexplained(const MeasuredSet& set, const std::vector<Window>& known,
-                             const std::vector<Window>& held_out, const PredictionErrors& errors,
-                             const std::optional<ErrorBounds>& bounds, const std::optional<Replicates>& replicates,
-                             std::uint32_t threads, const Stretches& stretches) {
+                             const std::vector<Window>& held_out, const HeldOutErrors& all,
+                             const std::optional<HeldOutErrors>& known_starts,
+                             const std::optional<Replicates>& replicates, std::uint32_t threads,
+                             const Stretches& stretches) {
   Unexplained u;
-  u.error_mm = errors.rmse_mm();
-  u.expected_mm = errors.expected_mm();
+  u.error_mm = all.errors.rmse_mm();
+  u.expected_mm = all.errors.expected_mm();
+  if (known_starts) {
+    u.known_starts_mm = known_starts->errors.rmse_mm();
+    u.known_starts_expected_mm = known_starts->errors.expected_mm();
+  }
   if (replicates) u.repetitions_mm = replicates->floor_mm;
   u.learner = learner_check(set, known, held_out, threads, stretches);
-  const Gap gap = largest_gap(u, bounds);
+  const std::vector<Comparison> comparisons = comparisons_of(all, known_starts);
+  const Gap gap = largest_gap(u, comparisons);
+  const Comparison* const exceeds = exceeding(u, comparisons);
   u.systematic_mm = gap.systematic_mm;
-  u.perhaps = !u.large() && exceeds_a_floor(u);
-  if (u.large()) {
-    const double error_mm = u.error_mm > 0 ? u.error_mm : u.learner->error_mm;
-    u.share = std::min(1.0, gap.systematic_mm * gap.systematic_mm / (error_mm * error_mm));
-  }
+  u.perhaps = !u.large() && exceeds != nullptr;
+  if (u.large()) u.share = std::min(1.0, gap.systematic_mm * gap.systematic_mm / (gap.error_mm * gap.error_mm));
   if (u.large() || u.perhaps) {
     // Without held-out windows: half of the tracks from the rest.
     u.patterns = held_out.empty() ? patterns_of(part_of(known, 2, 0, true), part_of(known, 2, 0, false), kShown)
                                   : patterns_of(known, held_out, kShown);
     if (u.patterns.size() > kMostPatterns) u.patterns.resize(kMostPatterns);
   }
-  u.in_words = words_of(u, bounds, gap.evidence) + odd_robot_in_words(set, errors);
+  u.in_words = words_of(u, gap, exceeds) + odd_robot_in_words(set, known_starts ? known_starts->errors : all.errors);
   return u;
 }
 

@@ -14,9 +14,17 @@
 
 namespace kilotwin::identify {
 
+/// The errors of held-out forecasts, with what the model expects of them.
+struct HeldOutErrors {
+  PredictionErrors errors;
+  std::optional<ErrorBounds> bounds;  ///< nothing: they are one track
+};
+
 struct Unexplained {
-  double error_mm = 0;                   ///< of the model on held-out data; 0: nothing is held out
-  double expected_mm = 0;                ///< by the model itself
+  double error_mm = 0;     ///< of the model on held-out data; 0: nothing is held out
+  double expected_mm = 0;  ///< by the model itself
+  /// The same of the forecasts from known starts, if there are others (forecast.hpp).
+  std::optional<double> known_starts_mm, known_starts_expected_mm;
   std::optional<double> repetitions_mm;  ///< differs between repetitions
   std::optional<LearnerCheck> learner;   ///< nothing: too few windows
   /// The largest systematic part by these comparisons, beyond their uncertainty; 0: none.
@@ -31,11 +39,12 @@ struct Unexplained {
   bool perhaps = false;
 };
 
-/// `known` and `held_out`: windows of the fit and of held-out data (may be empty); `errors` and `bounds`: of the model on
-/// held-out data. `set`: that `held_out` refers to, or `known` if nothing is held out.
+/// `known` and `held_out`: windows of the fit and of held-out data (may be empty), from known starts; `all` and `known_starts`: errors
+/// of the model on held-out data, the latter if some starts are unknown. `set`: that `held_out` refers to, or `known` if nothing is held
+/// out.
 [[nodiscard]] Unexplained find_unexplained(const MeasuredSet& set, const std::vector<Window>& known,
-                                           const std::vector<Window>& held_out, const PredictionErrors& errors,
-                                           const std::optional<ErrorBounds>& bounds,
+                                           const std::vector<Window>& held_out, const HeldOutErrors& all,
+                                           const std::optional<HeldOutErrors>& known_starts,
                                            const std::optional<Replicates>& replicates, std::uint32_t threads,
                                            const Stretches& = {});
 

@@ -71,7 +71,7 @@ PredictionErrors errors_by_track(const std::vector<Window>& windows, double expe
 
 Unexplained unexplained_in(const Sets& sets, double expected_mm, const std::optional<Replicates>& replicates = {}) {
   const PredictionErrors errors = errors_by_track(sets.held_out, expected_mm);
-  return find_unexplained(sets.set, sets.known, sets.held_out, errors, bounds_of(sets.set, errors, errors),
+  return find_unexplained(sets.set, sets.known, sets.held_out, {errors, bounds_of(sets.set, errors, errors)}, {},
                           replicates, 2);
 }
 
@@ -140,7 +140,7 @@ TEST(Unexplained, SaysWhatWasComparedAndWhatWasNot) {
   const PredictionErrors errors = errors_by_track(sets.held_out, 3.5);
   const auto words = [&](const std::vector<Window>& held_out, const PredictionErrors& of,
                          const std::optional<ErrorBounds>& bounds, bool perhaps) {
-    const Unexplained u = find_unexplained(sets.set, sets.known, held_out, of, bounds, {}, 2);
+    const Unexplained u = find_unexplained(sets.set, sets.known, held_out, {of, bounds}, {}, {}, 2);
     EXPECT_FALSE(u.large());
     EXPECT_EQ(u.perhaps, perhaps) << u.in_words;
     return u.in_words;
@@ -158,6 +158,40 @@ TEST(Unexplained, SaysWhatWasComparedAndWhatWasNot) {
   EXPECT_TRUE(says(within, "is near what the model expects")) << within;
   for (const std::string& text : {unsure, one_track, nothing})
     EXPECT_FALSE(says(text, "within what the model expects")) << text;
+}
+
+TEST(Unexplained, ErrorsFromUnknownStartsHideNoOthers) {
+  // 12 mm, of which the model expects 12: most of it is from before the headings were known. From known starts 4.2 mm are left, 2 expected.
+  const Sets sets = windows_with([](const Window&) { return 0.0; }, 3, 5);
+  const HeldOutErrors all{errors_by_track(windows_with([](const Window&) { return 12.0; }, 3, 5).held_out, 12.4),
+                          ErrorBounds{{11, 14}, {11, 14}, {-1, 1}, 12, 2}};
+  const PredictionErrors errors = errors_by_track(sets.held_out, 2);
+  const auto found = [&](const std::optional<HeldOutErrors>& known_starts) {
+    return find_unexplained(sets.set, sets.known, sets.held_out, all, known_starts, {}, 2);
+  };
+  EXPECT_FALSE(found({}).large());
+  EXPECT_FALSE(found({}).perhaps);
+  const Unexplained u = found(HeldOutErrors{errors, bounds_of(sets.set, errors, errors)});
+  ASSERT_TRUE(u.large()) << u.in_words;
+  EXPECT_NEAR(u.systematic_mm, std::sqrt(2 * 9 - 4), 0.5);
+  EXPECT_NE(u.in_words.find("from known starts"), std::string::npos) << u.in_words;
+  EXPECT_TRUE(found(HeldOutErrors{errors, {}}).perhaps);
+  // A model that expects the error from known starts, too.
+  EXPECT_FALSE(found(HeldOutErrors{errors_by_track(sets.held_out, 4.2), {}}).perhaps);
+}
+
+TEST(Unexplained, AStartIsKnownIfTheExpectedErrorIsNearTheMedian) {
+  std::vector<Forecast> forecasts;
+  for (const double expected_mm : {4.0, 5.0, 80.0, 5.0, 0.5, 14.0, 16.0, 5.0, 4.5})
+    forecasts.push_back({0, 0, 5.0 * static_cast<double>(forecasts.size()), 0, 0, expected_mm});
+  const std::vector<Forecast> known = from_known_starts(forecasts);
+  ASSERT_EQ(known.size(), 7U);
+  for (const Forecast& f : known) EXPECT_LE(f.expected_error_mm, 15);
+  EXPECT_TRUE(from_known_starts({}).empty());
+  // Expectations of another model decide, where it has them.
+  std::vector<Forecast> other(forecasts.begin(), forecasts.begin() + 3);
+  other[2].expected_error_mm = 6;
+  EXPECT_EQ(from_known_starts(with_expectations_of(other, forecasts)).size(), 8U);
 }
 
 TEST(Unexplained, NamesARobotWithAFarLargerError) {
