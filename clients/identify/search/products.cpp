@@ -391,6 +391,12 @@ double ProductFit::cost() const {
   return sum;
 }
 
+double ProductFit::cost_of_known() const {
+  const std::vector<Factor>& factors = state_.model.terms[place_].blocks.front().basis.factors;
+  const bool open = std::any_of(factors.begin(), factors.end(), [](const Factor& f) { return f.known.empty(); });
+  return open ? cost() - costs_.back() : cost();
+}
+
 /// A function of what only rises in a run that steps explain better becomes steps. It is open.
 void ProductFit::became_steps(std::size_t open) {
   if (!only_rises(functions_[open].axis) || functions_[open].shape != Shape::kCosines) return;

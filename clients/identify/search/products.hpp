@@ -26,6 +26,8 @@ class ProductFit {
   void fit();
   /// Complexity of the product: half the log determinants of the posterior precisions of its functions relative to their priors.
   [[nodiscard]] double cost() const;
+  /// The part of the cost that the evidence of the model lacks: of the functions that fit() leaves known.
+  [[nodiscard]] double cost_of_known() const;
 
  private:
   [[nodiscard]] Term& term() { return state_.model.terms[place_]; }

@@ -5,7 +5,9 @@
 
 #include "clients/identify/search/change_points.hpp"
 #include "clients/identify/search/moving_circles.hpp"
+#include "clients/identify/search/products.hpp"
 #include "clients/identify/search/search_loop.hpp"
+#include "clients/identify/search/target_extension.hpp"
 #include "clients/identify/search/travelling_waves.hpp"
 
 namespace kilotwin::identify {
@@ -160,11 +162,50 @@ bool SearchLoop::accept_moving_circle(bool alone) {
     Candidates best;
     add_candidates(dictionary_of_circles(out_.fit, extent_, circles), false, least_share * explained, best);
     if (!best.empty() && fits(std::move(best.begin()->second), attempt) &&
-        fitter_.log_evidence(out_.fit) > evidence + kClose && !(alone && leaves_hypothesis()))
+        fitter_.log_evidence(out_.fit) > evidence + kClose && !(alone && leaves_hypothesis())) {
+      Search circle = std::exchange(out_, before);
+      if (!became_product_of_parts(fitter_.log_evidence(circle.fit))) out_ = std::move(circle);
       return true;
+    }
   }
   out_ = before;
   return false;
+}
+
+bool SearchLoop::became_product_of_parts(double evidence) {
+  std::vector<std::size_t> of_place, rising;
+  for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t) {
+    if (!may_be_part_of_circle(t)) continue;
+    const std::vector<Factor> functions = functions_of(main_part(out_.fit.model.terms[t]));
+    if (functions.size() != 1) return false;
+    if (is_of_place(functions.front().axis)) of_place.push_back(t);
+    if (only_rises(functions.front().axis)) rising.push_back(t);
+  }
+  if (of_place.size() != 1 || rising.size() != 1) return false;
+  const Search before = out_;
+  std::vector<Term>& terms = out_.fit.model.terms;
+  const std::string rises = out_.reasons[rising[0]].covariates.front();
+  const std::size_t first = std::min(of_place[0], rising[0]), second = std::max(of_place[0], rising[0]);
+  std::vector<Factor> functions{functions_of(main_part(terms[rising[0]])).front(),
+                                functions_of(main_part(terms[of_place[0]])).front()};
+  terms[first] = main_part(terms[of_place[0]]);
+  terms[first].name = terms[rising[0]].name + "-and-position";
+  out_.reasons[first].covariates = {rises, "position"};
+  out_.reasons[first].finding.evidence += before.reasons[second].finding.evidence;
+  terms.erase(terms.begin() + static_cast<std::ptrdiff_t>(second));
+  out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(second));
+  ProductFit product(fitter_, out_.fit, first, std::move(functions));
+  product.fit();
+  fitter_.fit_until_settled(out_.fit);
+  // Negated, so that an evidence that is no number does not count.
+  if (!(fitter_.log_evidence(out_.fit) - product.cost_of_known() > evidence)) {
+    out_ = before;
+    return false;
+  }
+  out_.steps.push_back({terms[first].name, out_.reasons[first].finding.held_out});
+  extend_targets(fitter_, out_.fit, first);
+  fitter_.fit_contacts(out_.fit);
+  return true;
 }
 
 bool SearchLoop::accept_further_circle() {

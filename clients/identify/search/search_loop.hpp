@@ -152,6 +152,9 @@ class SearchLoop {
   /// if the evidence of the whole model is larger. `alone`: and if no hypothesis finds much beside it. Otherwise the effects may grow
   /// into a product that explains more.
   bool accept_moving_circle(bool alone);
+  /// Puts the product of two such effects, one of the position and one of what only rises, in place of both if the evidence of the whole
+  /// model exceeds `evidence`: a part of the arena that changes at once.
+  bool became_product_of_parts(double evidence);
   /// Adds a moving circle beside the other terms, if it passes the tests. Returns whether there is one.
   bool accept_further_circle();
   /// Adds the general term with the most evidence that fits. If the error is near what the model expects, only a clear one: an effect
