@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -234,6 +235,49 @@ bool put_steps(const Fitter& fitter, FitState& state, std::size_t place, const S
   return true;
 }
 
+/// Price of steps: the choices of their times, and their sizes.
+double price_of(const Steps& steps, std::size_t points) {
+  return (std::log(static_cast<double>(points)) + 3 * static_cast<double>(steps.kinds.size())) *
+         static_cast<double>(steps.at_s.size());
+}
+
+/// Where steps may be.
+struct StepRaster {
+  Basis like;
+  const std::vector<double>& points;
+  double apart_s;
+};
+
+/// Tries steps of the camera in place of a drift in the world, or the other way round. Contacts show which of the two moves: walls and
+/// contact noise that were fitted without the effect would decide at random, so both get their own. `cost`: of the term as it is.
+/// Returns whether the steps took its place.
+bool became_other_motion(const Fitter& fitter, FitState& state, std::size_t place, double cost, bool in_world,
+                         const StepRaster& raster) {
+  constexpr double kSurely = 3;
+  Steps steps;
+  for (const Target target : in_world ? std::array{Target::kMeasuredX, Target::kMeasuredY}
+                                      : std::array{Target::kWorldX, Target::kWorldY})
+    steps.kinds.push_back({target, raster.like, in_world ? kAlways : kDriven});
+  choose_steps(fitter, state, place, raster.points, steps);
+  FitState other = state;
+  if (steps.at_s.empty() || !put_steps(fitter, other, place, steps, raster.apart_s)) return false;
+  other.model.terms[place].name = in_world ? "camera-by-time" : "drift-by-time";
+  double rise = fitter.fit_for_likelihood(other, 2);
+  FitState own = state;
+  if (state.model.walls.any()) {
+    for (FitState* const one : {&own, &other}) {
+      fitter.fit_contacts(*one);
+      fitter.fit_until_settled(*one);
+    }
+    rise = fitter.log_likelihood_of_all(other) - fitter.log_likelihood_of_all(own);
+  } else {
+    rise -= fitter.log_likelihood(own);
+  }
+  const bool better = rise + cost - price_of(steps, raster.points.size()) > kSurely;
+  state = better ? std::move(other) : std::move(own);
+  return better;
+}
+
 }  // namespace
 
 bool only_rises(const Axis& axis) {
@@ -282,49 +326,41 @@ std::string find_change_points(const Fitter& fitter, FitState& state, std::size_
   } else {
     forms.push_back({kinds, true, {}, 0});
   }
-  // A displacement in the world and one of the camera look alike until the instant is known.
-  const Basis basis = kinds.front().basis;
-  const std::vector<Block> walls = {{Target::kWorldX, basis, kDriven}, {Target::kWorldY, basis, kDriven}},
-                           picture = {{Target::kMeasuredX, basis, kAlways}, {Target::kMeasuredY, basis, kAlways}};
-  const Target acts_on = kinds.front().target;
-  const bool in_world = acts_on == Target::kWorldX || acts_on == Target::kWorldY,
-             in_image = acts_on == Target::kMeasuredX;
-  const bool by_the_clock = basis.only_open()->axis.of == Covariate::kTime;
-  if (!product && by_the_clock && (in_world || in_image))
-    forms.push_back({in_world ? picture : walls, false, {}, 0});
   // On the raster the gain is approximate. The decision follows after the refinement.
   FitState best = state;
-  double best_gain = 0;
+  double best_gain = 0, best_cost = NAN;
   struct Known {
     double log_likelihood, bends;
   };
   std::optional<Known> had;  // of the state as it was
-  for (std::size_t f = 0; f < forms.size(); ++f) {
-    Steps& form = forms[f];
+  for (Steps& form : forms) {
     constexpr double kBetter = 2;
-    const bool other = f == 2;
     choose_steps(fitter, state, place, points, form);
-    if (form.at_s.empty() || (form.gain < kBetter && !other)) continue;
+    if (form.at_s.empty() || form.gain < kBetter) continue;
     FitState trial = state;
     if (!put_steps(fitter, trial, place, form, apart_s)) continue;
-    if (other) trial.model.terms[place].name = in_world ? "camera-by-time" : "drift-by-time";
     double likelihood = fitter.fit_for_likelihood(trial, 2);
     if (form.beside) {
       refit(fitter, trial, place);
       likelihood = fitter.log_likelihood(trial);
     }
-    // Price of a step: the choice of its time, and its size. Price of a curve: its complexity.
-    const double price = std::log(static_cast<double>(points.size())) + 3 * static_cast<double>(form.kinds.size());
     if (!had) had = Known{fitter.log_likelihood(state), bends(fitter, state, place)};
-    const double gain = likelihood - had->log_likelihood + (form.beside ? 0 : had->bends) -
-                        price * static_cast<double>(form.at_s.size());
-    // Without clear evidence the target stays.
-    constexpr double kSurelyOther = 3;
-    if (gain <= best_gain + (other ? kSurelyOther : 0)) continue;
+    const double cost = price_of(form, points.size()) + (form.beside ? had->bends : 0),
+                 gain = likelihood - had->log_likelihood + had->bends - cost;
+    if (gain <= best_gain) continue;
     best_gain = gain;
+    best_cost = cost;
     best = std::move(trial);
   }
   state = std::move(best);
+  // A displacement in the world and one of the camera look alike until the instant is known.
+  const Block& acting = kinds.front();
+  const bool in_world = acting.target == Target::kWorldX || acting.target == Target::kWorldY;
+  if (product || acting.basis.only_open()->axis.of != Covariate::kTime ||
+      (!in_world && acting.target != Target::kMeasuredX))
+    return name;
+  if (std::isnan(best_cost)) best_cost = bends(fitter, state, place);
+  (void)became_other_motion(fitter, state, place, best_cost, in_world, {acting.basis, points, apart_s});
   return model.terms[place].name;
 }
 
