@@ -8,6 +8,7 @@
 
 #include "clients/identify/search/search.hpp"
 #include "tests/identify/small_set.hpp"
+#include "tests/identify/truth/random_effects.hpp"
 
 namespace kilotwin {
 namespace {
@@ -23,9 +24,19 @@ truth::Scene large(void (*push)(const truth::Situation&, truth::Push&)) {
   return scene;
 }
 
+/// Half of the robots and three quarters of the time, at nearly the same density.
+truth::Scene smaller(truth::Scene scene) {
+  scene.robots /= 2;
+  scene.width_mm *= 0.75;
+  scene.height_mm *= 0.75;
+  scene.train_s *= 0.75;
+  scene.test_runs = 0;
+  return scene;
+}
+
 /// The effects that the search finds.
-std::string found_in(const truth::Scene& scene) {
-  auto&& [set, fitter, base] = BaseFit(scene);
+std::string found_in(const truth::Scene& scene, std::uint64_t seed = 5) {
+  auto&& [set, fitter, base] = BaseFit(scene, seed);
   const identify::Search found = identify::search(fitter, base, identify::WorkLog({}));
   std::string names;
   for (const identify::Term& term : found.fit.model.terms) names += (names.empty() ? "" : ", ") + term.name;
@@ -48,6 +59,17 @@ TEST(Pairs, StartsAfterAStopByTheHeading) {
     push.gain.right *= gain;
   });
   EXPECT_NE(found_in(scene).find("speed-by-history-and-heading-and-time-since-command"), std::string::npos);
+}
+
+TEST(Pairs, APartOfTheRoomThatIsLitAtOnce) {
+  // Effects of place and of time are found first. A moving circle explains more than both together, their product still more.
+  EXPECT_EQ(found_in(smaller(truth::scenario("lamp")), 1), "speed-by-time-and-position");
+}
+
+TEST(WithoutHeadings, ACameraThatSwaysIsNoDrift) {
+  // The walls of the base model do not sway. Beside them, a drift explains more.
+  constexpr std::uint64_t kSeed = 3001;
+  EXPECT_EQ(found_in(smaller(truth::random_effects(kSeed)), kSeed), "camera-by-time");
 }
 
 TEST(Wheels, OneThatGainsSpeedInARun) {
