@@ -77,11 +77,11 @@ void assess(Findings& f, const Fitter& fitter, const MeasuredSet& train, const M
     const PredictionErrors errors = errors_of(evaluation.set(), known);
     known_starts = HeldOutErrors{errors, bounds_of(evaluation.set(), errors, errors)};
   }
-  f.unexplained = find_unexplained(gives_errors(f.held_out) ? evaluation.set() : train,
-                                   fitted_windows(f.found.fit, from_known_starts(fitted), times.horizon_s),
-                                   windows_of(f.after.tracks, known, times.horizon_s), {f.after.errors, f.bounds},
-                                   known_starts, f.replicates, threads,
-                                   {std::max(20.0, 2 * times.horizon_s), !f.numbering.anew()});
+  f.unexplained =
+      find_unexplained(gives_errors(f.held_out) ? evaluation.set() : train,
+                       fitted_windows(f.found.fit, from_known_starts(fitted), times.horizon_s),
+                       windows_of(f.after.tracks, known, times.horizon_s), {f.after.errors, f.bounds}, known_starts,
+                       f.replicates, threads, {std::max(20.0, 2 * times.horizon_s), !f.numbering.anew()});
 }
 
 /// Errors over the horizon, if anything is held out.
@@ -163,8 +163,8 @@ Search found_by_search(const Fitter& fitter, const FitState& base, const Measure
     const FitState white = with_white_noise(fitter, fit);
     const std::vector<Forecast> expected = forecast(white.model, fit.tracks, times, Tracks::kFit, options.threads);
     // Motion in contact is uncertain, and no effect.
-    const std::vector<Forecast> free = from_known_starts(
-        free_ones(fit.model, fit.tracks, with_expectations_of(expected, all), options.horizon_s));
+    const std::vector<Forecast> free =
+        from_known_starts(free_ones(fit.model, fit.tracks, with_expectations_of(expected, all), options.horizon_s));
     const PredictionErrors errors = errors_of(train, free);
     return leaves_systematic_error(train, windows_of(fit.tracks, free, options.horizon_s), errors, options.threads);
   };

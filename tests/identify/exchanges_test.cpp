@@ -7,7 +7,6 @@
 #include <string>
 #include <utility>
 
-#include "clients/identify/search/search.hpp"
 #include "tests/identify/small_set.hpp"
 
 namespace kilotwin {
@@ -19,15 +18,6 @@ truth::Effect effect(std::function<void(const truth::Situation&, truth::Push&)> 
   out.name = "effect";
   out.push = std::move(push);
   return out;
-}
-
-/// The only effect that the search finds; no name if there is none, or more.
-std::string found_in(const truth::Scene& scene, std::uint64_t seed) {
-  auto&& [set, fitter, base] = BaseFit(scene, seed);
-  const identify::Search found = identify::search(fitter, base, identify::WorkLog({}));
-  std::string names;
-  for (const identify::Term& term : found.fit.model.terms) names += (names.empty() ? "" : ", ") + term.name;
-  return names;
 }
 
 truth::Scene without_headings(const truth::Effect& one) {

@@ -6,7 +6,6 @@
 #include <string>
 #include <utility>
 
-#include "clients/identify/search/search.hpp"
 #include "tests/identify/small_set.hpp"
 #include "tests/identify/truth/random_effects.hpp"
 
@@ -32,15 +31,6 @@ truth::Scene smaller(truth::Scene scene) {
   scene.train_s *= 0.75;
   scene.test_runs = 0;
   return scene;
-}
-
-/// The effects that the search finds.
-std::string found_in(const truth::Scene& scene, std::uint64_t seed = 5) {
-  auto&& [set, fitter, base] = BaseFit(scene, seed);
-  const identify::Search found = identify::search(fitter, base, identify::WorkLog({}));
-  std::string names;
-  for (const identify::Term& term : found.fit.model.terms) names += (names.empty() ? "" : ", ") + term.name;
-  return names;
 }
 
 TEST(Pairs, APatchThatActsOnOneWheelByItsMotorTime) {

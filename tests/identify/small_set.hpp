@@ -11,6 +11,7 @@
 
 #include "clients/identify/data/measured_set.hpp"
 #include "clients/identify/fit/fitter.hpp"
+#include "clients/identify/search/search.hpp"
 #include "tests/identify/truth/files.hpp"
 #include "tests/identify/truth/play.hpp"
 #include "tests/identify/truth/scenarios.hpp"
@@ -55,5 +56,14 @@ struct BaseFit {
   const identify::Fitter fitter;
   identify::FitState state;
 };
+
+/// Names of the effects that the search finds, with commas.
+inline std::string found_in(const truth::Scene& scene, std::uint64_t seed = 5) {
+  const BaseFit base(scene, seed);
+  const identify::Search found = identify::search(base.fitter, base.state, identify::WorkLog({}));
+  std::string names;
+  for (const identify::Term& term : found.fit.model.terms) names += (names.empty() ? "" : ", ") + term.name;
+  return names;
+}
 
 }  // namespace kilotwin

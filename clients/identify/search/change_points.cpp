@@ -255,8 +255,8 @@ bool became_other_motion(const Fitter& fitter, FitState& state, std::size_t plac
                          const StepRaster& raster) {
   constexpr double kSurely = 3;
   Steps steps;
-  for (const Target target : in_world ? std::array{Target::kMeasuredX, Target::kMeasuredY}
-                                      : std::array{Target::kWorldX, Target::kWorldY})
+  for (const Target target :
+       in_world ? std::array{Target::kMeasuredX, Target::kMeasuredY} : std::array{Target::kWorldX, Target::kWorldY})
     steps.kinds.push_back({target, raster.like, in_world ? kAlways : kDriven});
   choose_steps(fitter, state, place, raster.points, steps);
   FitState other = state;

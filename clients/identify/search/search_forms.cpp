@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "clients/identify/search/change_points.hpp"
@@ -183,29 +184,51 @@ bool SearchLoop::became_product_of_parts(double evidence) {
   }
   if (of_place.size() != 1 || rising.size() != 1) return false;
   const Search before = out_;
+  const Factor place = functions_of(main_part(out_.fit.model.terms[of_place[0]])).front();
+  std::vector<Factor> rise{functions_of(main_part(out_.fit.model.terms[rising[0]])).front()};
+  if (rise.front().axis.of != Covariate::kTime) {
+    // What else rises in a run may stand for time, the simplest.
+    Factor time = over(Factor::Shape::kCosines, Covariate::kTime, 0, extent_.duration_s, 6);
+    time.known.assign(time.columns(), 0);
+    time.plus = 1;
+    rise.insert(rise.begin(), std::move(time));
+  }
+  std::optional<Search> best;
+  for (const Factor& function : rise) {
+    out_ = before;
+    const double of_product = evidence_of_product(of_place[0], rising[0], {function, place});
+    // Negated, so that an evidence that is no number does not count.
+    if (!(of_product > evidence)) continue;
+    evidence = of_product + kClose;
+    best = out_;
+  }
+  out_ = best.value_or(before);
+  if (!best) return false;
+  const std::size_t at = std::min(of_place[0], rising[0]);
+  out_.steps.push_back({out_.fit.model.terms[at].name, out_.reasons[at].finding.held_out});
+  extend_targets(fitter_, out_.fit, at);
+  fitter_.fit_contacts(out_.fit);
+  return true;
+}
+
+double SearchLoop::evidence_of_product(std::size_t of_place, std::size_t rising, std::vector<Factor> functions) {
   std::vector<Term>& terms = out_.fit.model.terms;
-  const std::string rises = out_.reasons[rising[0]].covariates.front();
-  const std::size_t first = std::min(of_place[0], rising[0]), second = std::max(of_place[0], rising[0]);
-  std::vector<Factor> functions{functions_of(main_part(terms[rising[0]])).front(),
-                                functions_of(main_part(terms[of_place[0]])).front()};
-  terms[first] = main_part(terms[of_place[0]]);
-  terms[first].name = terms[rising[0]].name + "-and-position";
-  out_.reasons[first].covariates = {rises, "position"};
-  out_.reasons[first].finding.evidence += before.reasons[second].finding.evidence;
+  const bool of_time = functions.front().axis.of == Covariate::kTime;
+  const std::string name = of_time ? "speed-by-time" : terms[rising].name,
+                    word = of_time ? "time" : out_.reasons[rising].covariates.front();
+  const std::size_t first = std::min(of_place, rising), second = std::max(of_place, rising);
+  terms[first] = main_part(terms[of_place]);
+  terms[first].name = name + "-and-position";
+  out_.reasons[first].covariates = {word, "position"};
+  const Finding of_both[] = {out_.reasons[first].finding, out_.reasons[second].finding};
+  out_.reasons[first].finding.evidence = of_both[0].evidence + of_both[1].evidence;
+  out_.reasons[first].finding.log10_p = std::min(of_both[0].log10_p, of_both[1].log10_p);
   terms.erase(terms.begin() + static_cast<std::ptrdiff_t>(second));
   out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(second));
   ProductFit product(fitter_, out_.fit, first, std::move(functions));
   product.fit();
   fitter_.fit_until_settled(out_.fit);
-  // Negated, so that an evidence that is no number does not count.
-  if (!(fitter_.log_evidence(out_.fit) - product.cost_of_known() > evidence)) {
-    out_ = before;
-    return false;
-  }
-  out_.steps.push_back({terms[first].name, out_.reasons[first].finding.held_out});
-  extend_targets(fitter_, out_.fit, first);
-  fitter_.fit_contacts(out_.fit);
-  return true;
+  return fitter_.log_evidence(out_.fit) - product.cost_of_known();
 }
 
 bool SearchLoop::accept_further_circle() {

@@ -155,6 +155,8 @@ class SearchLoop {
   /// Puts the product of two such effects, one of the position and one of what only rises, in place of both if the evidence of the whole
   /// model exceeds `evidence`: a part of the arena that changes at once.
   bool became_product_of_parts(double evidence);
+  /// Puts a product of functions in place of two terms, and fits. The evidence of the whole model.
+  double evidence_of_product(std::size_t of_place, std::size_t rising, std::vector<Factor> functions);
   /// Adds a moving circle beside the other terms, if it passes the tests. Returns whether there is one.
   bool accept_further_circle();
   /// Adds the general term with the most evidence that fits. If the error is near what the model expects, only a clear one: an effect

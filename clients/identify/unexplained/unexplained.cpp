@@ -64,7 +64,8 @@ Gap largest_gap(const Unexplained& u, const std::vector<Comparison>& comparisons
       return std::sqrt(std::max(0.0, c.error_mm * c.error_mm - floor_mm * floor_mm));
     };
     if (c.expected_mm > 0 && beyond(c.expected_mm))
-      note(above(c.expected_mm), c.error_mm, c.of, fmt::format("the model itself expects {:.2f} mm", c.expected_mm));
+      note(above(c.expected_mm), c.error_mm, c.of,
+           fmt::format("the model itself expects {:.2f} mm", c.expected_mm));
     if (u.repetitions_mm && beyond(*u.repetitions_mm))
       note(above(*u.repetitions_mm), c.error_mm, c.of,
            fmt::format("repetitions of the same commands differ by {:.2f} mm only", *u.repetitions_mm));
@@ -105,12 +106,12 @@ std::string comparison_in_words(const Unexplained& u, const Comparison* exceeds)
   const std::string exceeded =
       c.expected_mm > 0 && c.error_mm > kBeyond * c.expected_mm
           ? fmt::format("exceeds the {:.2f} mm that the model expects", c.expected_mm)
-          : fmt::format("exceeds the {:.2f} mm by which repetitions of the same commands differ", *u.repetitions_mm);
-  return fmt::format("The error of {:.2f} mm{} {}, but too few data are held out to be sure: {}", c.error_mm, c.of,
-                     exceeded,
-                     c.interval ? fmt::format("it is {:.2f} to {:.2f} mm (95 %).", c.interval->low_mm,
-                                              c.interval->high_mm)
-                                : "they are one track.");
+          : fmt::format("exceeds the {:.2f} mm by which repetitions of the same commands differ",
+                        *u.repetitions_mm);
+  return fmt::format(
+      "The error of {:.2f} mm{} {}, but too few data are held out to be sure: {}", c.error_mm, c.of, exceeded,
+      c.interval ? fmt::format("it is {:.2f} to {:.2f} mm (95 %).", c.interval->low_mm, c.interval->high_mm)
+                 : "they are one track.");
 }
 
 std::string variation_in_words(const std::vector<Pattern>& patterns) {
@@ -150,7 +151,8 @@ std::string words_of(const Unexplained& u, const Gap& gap, const Comparison* exc
            (u.learner ? " A random forest over all covariates predicts no large part of the error."
                       : " There are too few predictions for a random forest to look for a pattern in the error.");
   return fmt::format(
-             "Of the prediction error of {:.2f} mm{}, {:.2f} mm are systematic and unexplained ({:.0f} % of the mean "
+             "Of the prediction error of {:.2f} mm{}, {:.2f} mm are systematic and unexplained ({:.0f} % of the "
+             "mean "
              "square error): {}.",
              gap.error_mm, gap.of, u.systematic_mm, 100 * u.share, gap.evidence) +
          variation_in_words(u.patterns);
@@ -192,7 +194,8 @@ Unexplained find_unexplained(const MeasuredSet& set, const std::vector<Window>& 
                                   : patterns_of(known, held_out, kShown);
     if (u.patterns.size() > kMostPatterns) u.patterns.resize(kMostPatterns);
   }
-  u.in_words = words_of(u, gap, exceeds) + odd_robot_in_words(set, known_starts ? known_starts->errors : all.errors);
+  u.in_words =
+      words_of(u, gap, exceeds) + odd_robot_in_words(set, known_starts ? known_starts->errors : all.errors);
   return u;
 }
 
