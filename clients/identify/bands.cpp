@@ -28,7 +28,7 @@ class TermBand {
            const std::vector<StepInterval>& steps)
       : term_(model.terms[term]), values_(model, uncertainty, term) {
     for (const StepInterval& step : steps)
-      if (step.term == term && step.low && step.high) steps_.push_back(step);
+      if (step.term == term && !step.is_radius && step.low && step.high) steps_.push_back(step);
   }
 
   [[nodiscard]] BandPoint at(const std::vector<BlockPlace>& places) const {

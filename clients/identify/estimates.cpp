@@ -44,17 +44,19 @@ void add_wave(std::vector<Estimate>& to, const Uncertainty& u, Eigen::Index wave
   add("phase speed", "mm/s", speed, slope);
 }
 
-std::string step_name(Covariate of) {
-  if (of == Covariate::kTime) return "instant";
-  std::string name = name_of(of);
+std::string step_name(const StepInterval& step) {
+  // Sums over neighbours by their distance reach to a radius, where they are 0.
+  if (step.is_radius) return step.axis.of == Covariate::kNeighbours ? "radius" : "reach";
+  if (step.axis.of == Covariate::kTime) return "instant";
+  std::string name = name_of(step.axis.of);
   std::replace(name.begin(), name.end(), '_', ' ');
   return "step at " + name;
 }
 
 Estimate estimate_of(const StepInterval& step) {
   Estimate out;
-  out.set_name(step_name(step.axis.of));
-  out.set_unit(unit_of(step.axis.of));
+  out.set_name(step_name(step));
+  out.set_unit(step.is_radius ? "mm" : unit_of(step.axis.of));
   out.set_value(step.at);
   if (step.low) out.set_low(*step.low);
   if (step.high) out.set_high(*step.high);

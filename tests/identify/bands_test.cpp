@@ -264,6 +264,34 @@ TEST(StepIntervals, OfAnInstantHoldTheTruth) {
   EXPECT_GE(held, static_cast<int>(kSets) - 1);
 }
 
+TEST(StepIntervals, OfTheRadiusWithinWhichNeighboursCountHoldTheTruth) {
+  truth::Scene scene = small({truth::third_of_a_party()});
+  scene.width_mm = scene.height_mm = 450;
+  const double truth_mm = scene.effects.front().numbers.at("radius");
+  Factor count;
+  count.shape = Factor::Shape::kAtLeast;
+  count.axis.of = Covariate::kNeighbours;
+  count.axis.within_mm = 97;
+  count.points = {2};
+  constexpr std::uint64_t kSets = 8;
+  int held = 0;
+  for (std::uint64_t seed = 1; seed <= kSets; ++seed) {
+    const FittedTerm f(scene, seed, term_of(count, -0.3));
+    const std::vector<StepInterval> found = step_intervals_of(f.fitter, f.state, f.uncertainty);
+    ASSERT_EQ(found.size(), 1U) << "the radius; an interval of a count says nothing";
+    EXPECT_TRUE(found[0].is_radius);
+    ASSERT_TRUE(found[0].low && found[0].high) << seed;
+    held += *found[0].low <= truth_mm && truth_mm <= *found[0].high ? 1 : 0;
+    EXPECT_LT(*found[0].high - *found[0].low, 30) << seed;
+    EXPECT_GT(*found[0].high - *found[0].low, 0.2) << seed;
+    const auto numbers = estimates_of(0, f.uncertainty, found);
+    ASSERT_EQ(numbers.size(), 1U);
+    EXPECT_EQ(numbers[0].name(), "radius");
+    EXPECT_EQ(numbers[0].unit(), "mm");
+  }
+  EXPECT_GE(held, static_cast<int>(kSets) - 1);
+}
+
 TEST(Uncertainty, OfTheBiasesPopulationIsThatOfASample) {
   auto&& [set, fitter, state] = BaseFit(small({}));
   const Uncertainty u = uncertainty_of(fitter, state);

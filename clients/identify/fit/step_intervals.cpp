@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "clients/identify/fit/profile.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -30,6 +32,10 @@ bool is_in_data(const Factor& f, double point) {
 /// Whether the covariate varies continuously: an interval of a count says nothing.
 bool is_continuous(const Axis& axis) { return *unit_of(axis.of) != 0; }
 
+bool is_of_neighbours(const Axis& axis) {
+  return axis.of >= Covariate::kNeighbours && axis.of <= Covariate::kBearing;
+}
+
 std::vector<StepInterval> steps_of(const MotionModel& model) {
   std::vector<StepInterval> all;
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
@@ -48,9 +54,40 @@ std::vector<StepInterval> steps_of(const MotionModel& model) {
   return all;
 }
 
-/// The columns of a block that jump at a step, as flags of all products of the basis; empty: none.
+/// Radii within which neighbours are listed. The farther ones are sums of other kinds.
+std::vector<StepInterval> radii_of(const MotionModel& model) {
+  std::vector<StepInterval> all;
+  for (std::size_t t = 0; t < model.terms.size(); ++t) {
+    for (const Block& block : model.terms[t].blocks) {
+      for (const Factor& f : block.basis.factors) {
+        if (!is_of_neighbours(f.axis) || reach_mm(f.axis) > kListed_mm) continue;
+        const double reach = reach_mm(f.axis);
+        const bool known = std::any_of(all.begin(), all.end(),
+                                       [&](const StepInterval& s) { return s.term == t && s.at == reach; });
+        if (!known) all.push_back({t, f.axis, reach, true});
+      }
+    }
+  }
+  return all;
+}
+
+/// Whether this radius is that of a factor.
+bool is_radius_of(const StepInterval& step, const Factor& f) {
+  return step.is_radius && is_of_neighbours(f.axis) && reach_mm(f.axis) == step.at;
+}
+
+/// The columns of a block that jump at a step, or depend on a radius, as flags of all products of the basis; empty: none.
 std::vector<bool> jumping_products(const Basis& basis, const StepInterval& step) {
   std::vector<bool> jump;
+  if (step.is_radius) {
+    if (std::none_of(basis.factors.begin(), basis.factors.end(),
+                     [&](const Factor& f) { return is_radius_of(step, f); }))
+      return jump;
+    std::size_t products = 1;
+    for (const Factor& f : basis.factors) products *= f.size();
+    jump.assign(products, true);
+    return jump;
+  }
   for (std::size_t f = 0; f < basis.factors.size(); ++f) {
     const Factor& factor = basis.factors[f];
     if (factor.shape != Factor::Shape::kAtLeast || !(factor.axis == step.axis)) continue;
@@ -67,9 +104,16 @@ std::vector<bool> jumping_products(const Basis& basis, const StepInterval& step)
   return jump;
 }
 
-/// The block with the point of a step elsewhere.
+/// The block with the point of a step elsewhere, or with another radius, at most the farthest that has a list.
 Block moved(Block block, const StepInterval& step, double by) {
+  constexpr double kLeast_mm = 10;
   for (Factor& f : block.basis.factors) {
+    if (is_radius_of(step, f)) {
+      f.axis.within_mm = static_cast<float>(std::clamp(step.at + by, kLeast_mm, kListed_mm));
+      // Its columns end at the radius.
+      if (f.shape == Factor::Shape::kTaper && f.axis.of == Covariate::kNearest) f.high = f.axis.within_mm;
+      continue;
+    }
     if (f.shape != Factor::Shape::kAtLeast || !(f.axis == step.axis)) continue;
     for (double& point : f.points)
       if (point == step.at) point += by;
@@ -77,12 +121,16 @@ Block moved(Block block, const StepInterval& step, double by) {
   return block;
 }
 
-/// The jump of a term at a step, with the step at each of its places: one sum of columns per place, the present one last.
+/// How far the i-th place of a step or radius lies from the middle of all.
+double move_of_place(int i, double finest) { return move_of(i / 2, finest) * (i % 2 == 0 ? -1 : 1); }
+
+/// The jump of a term at a step, with the step at each of its places, about `middle` from where it is: one sum of columns per place, the
+/// present one last.
 struct Jumps {
   ColumnSums sums;
   std::vector<Eigen::Index> columns;  ///< of the model, which the jump replaces
 };
-Jumps jumps_of(const MotionModel& model, const StepInterval& step) {
+Jumps jumps_of(const MotionModel& model, const StepInterval& step, double middle) {
   Jumps out;
   std::size_t index = 0;
   const double finest = finest_of(step.axis);
@@ -104,7 +152,7 @@ Jumps jumps_of(const MotionModel& model, const StepInterval& step) {
       first += n;
       if (jump.empty()) continue;
       for (int i = 0; i <= 2 * kMovesToASide; ++i) {
-        const double by = i == 2 * kMovesToASide ? 0 : move_of(i / 2, finest) * (i % 2 == 0 ? -1 : 1);
+        const double by = i == 2 * kMovesToASide ? 0 : middle + move_of_place(i, finest);
         for (WeighedBlock& part : value_as_blocks(moved(block, step, by), own))
           out.sums.add(std::move(part.block), of, i, part.weight);
       }
@@ -158,6 +206,9 @@ Eigen::VectorXd rises_of(const Fitter& fitter, const FitState& state, const Jump
   return (values.array() - values[in_place]).head(in_place);
 }
 
+/// Whether the likelihood has no corner: covariates other than a count change little where a robot crosses the radius.
+bool is_smooth(const StepInterval& step) { return step.is_radius && step.axis.of != Covariate::kNeighbours; }
+
 /// Where the likelihood has fallen by `most` below its maximum on one side, between the moves; nothing: nowhere.
 std::optional<double> end_of(const Eigen::VectorXd& rises, int side, double highest, double most, double finest) {
   // The farthest move that is likely enough, so that a hole in the likelihood does not end the interval.
@@ -176,14 +227,33 @@ std::optional<double> end_of(const Eigen::VectorXd& rises, int side, double high
 std::vector<StepInterval> step_intervals_of(const Fitter& fitter, const FitState& state,
                                             const Uncertainty& uncertainty) {
   std::vector<StepInterval> steps = steps_of(state.model);
+  const std::vector<StepInterval> radii = radii_of(state.model);
+  steps.insert(steps.end(), radii.begin(), radii.end());
   for (StepInterval& step : steps) {
-    const Jumps jumps = jumps_of(state.model, step);
+    const double finest = finest_of(step.axis),
+                 most = (is_smooth(step) ? kProfileDrop95 : kStepDrop95) * uncertainty.dispersion;
+    Jumps jumps = jumps_of(state.model, step, 0);
     if (jumps.sums.blocks.empty()) continue;
-    const Eigen::VectorXd rises = rises_of(fitter, state, jumps);
-    const double highest = std::max(0.0, rises.maxCoeff()), finest = finest_of(step.axis),
-                 most = kStepDrop95 * uncertainty.dispersion;
-    if (const auto below = end_of(rises, 0, highest, most, finest)) step.low = step.at - *below;
-    if (const auto above = end_of(rises, 1, highest, most, finest)) step.high = step.at + *above;
+    Eigen::VectorXd rises = rises_of(fitter, state, jumps);
+    double middle = 0, highest = 0;
+    // The search knows radii to a millimetre; the data may know them better.
+    constexpr int kMostRounds = 2;
+    for (int round = 0; step.is_radius && round < kMostRounds; ++round) {
+      int best = 0;
+      const double rise = rises.maxCoeff(&best);
+      if (!(rise > highest + 0.1 * most)) break;
+      highest = rise;
+      middle += move_of_place(best, finest);
+      jumps = jumps_of(state.model, step, middle);
+      rises = rises_of(fitter, state, jumps);
+    }
+    highest = std::max(highest, rises.maxCoeff());
+    // Of a radius, the interval holds the value that the model has, and what the noise of measured distances may hide.
+    const double least = step.is_radius ? std::sqrt(state.model.noise.position_mm2) : 0;
+    if (const auto below = end_of(rises, 0, highest, most, finest))
+      step.low = step.at + (step.is_radius ? std::min(0.0, middle - *below) - least : -*below);
+    if (const auto above = end_of(rises, 1, highest, most, finest))
+      step.high = step.at + (step.is_radius ? std::max(0.0, middle + *above) + least : *above);
   }
   return steps;
 }

@@ -331,7 +331,10 @@ Effect third_of_a_party(double strength) {
             for_others(at, [&](double, double, double d) { near += d < 95 ? 1 : 0; });
             if (near >= 2) slow_both(push, 1 - 0.45 * strength);
           },
-          {}};
+          {},
+          {},
+          false,
+          {{"radius", 95}}};
 }
 
 Effect flight(double strength) {
