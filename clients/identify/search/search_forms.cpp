@@ -187,7 +187,7 @@ bool SearchLoop::became_product_of_parts(double evidence) {
   const Factor place = functions_of(main_part(out_.fit.model.terms[of_place[0]])).front();
   std::vector<Factor> rise{functions_of(main_part(out_.fit.model.terms[rising[0]])).front()};
   if (rise.front().axis.of != Covariate::kTime) {
-    // What else rises in a run may stand for time, the simplest.
+    // Driven time or a count of commands may stand for time, the simplest.
     Factor time = over(Factor::Shape::kCosines, Covariate::kTime, 0, extent_.duration_s, 6);
     time.known.assign(time.columns(), 0);
     time.plus = 1;
