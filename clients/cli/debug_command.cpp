@@ -2,6 +2,9 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/prctl.h>
+#include <sys/ptrace.h>
+#include <sys/user.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -10,6 +13,7 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <string>
@@ -37,6 +41,35 @@ struct DebugArguments : RunArguments {
   std::vector<std::string> commands;
 };
 
+/// Whether the processor stops a process that writes to a watched address. Those of some virtual machines never do.
+bool processor_watches() {
+  static volatile int watched = 0;
+  const pid_t child = fork();
+  if (child < 0) return false;
+  if (child == 0) {
+    ptrace(PTRACE_TRACEME, 0, nullptr, nullptr);
+    raise(SIGSTOP);
+    watched = 1;
+    _exit(0);
+  }
+  int status = 0;
+  if (waitpid(child, &status, 0) != child || !WIFSTOPPED(status)) return false;
+  // Debug register 7: breakpoint 0 is on, for writes of four octets.
+  constexpr std::uintptr_t kOnWrites = 0xD0001;
+  const auto put = [&](std::size_t number, std::uintptr_t value) {
+    const std::size_t at = offsetof(user, u_debugreg) + number * sizeof(value);
+    ptrace(PTRACE_POKEUSER, child, at, value);
+  };
+  put(0, reinterpret_cast<std::uintptr_t>(&watched));
+  put(7, kOnWrites);
+  ptrace(PTRACE_CONT, child, nullptr, nullptr);
+  if (waitpid(child, &status, 0) != child || !WIFSTOPPED(status)) return false;
+  const bool watches = WSTOPSIG(status) == SIGTRAP;
+  kill(child, SIGKILL);
+  waitpid(child, &status, 0);
+  return watches;
+}
+
 /// The first commands of gdb: it learns where the robot's program lies in memory, and stops there for this robot alone.
 std::string gdb_script(const DebugArguments& arguments, const RunPlan& plan,
                        const recorder::RunDirectory& directory, const behaviours::Program& program) {
@@ -48,7 +81,11 @@ std::string gdb_script(const DebugArguments& arguments, const RunPlan& plan,
     const double ticks = std::floor(arguments.at_s / plan.tick_length.seconds_at(Tick{1}));
     condition += fmt::format(" && kilo_ticks >= {:.0f}", ticks);
     // A program may pass the place thousands of times per tick, and gdb looks at each. The processor itself watches the clock.
-    wait = fmt::format("watch -l kilo_ticks if kilo_ticks >= {:.0f}\ncontinue\ndelete\n", ticks);
+    if (processor_watches())
+      wait = fmt::format("watch -l kilo_ticks if kilo_ticks >= {:.0f}\ncontinue\ndelete\n", ticks);
+    else
+      fmt::print(stderr, "kilotwin: this machine has no hardware watchpoints; gdb looks at each pass of {}: slow\n",
+                 arguments.place);
   }
   std::string script =
       "set confirm off\n"

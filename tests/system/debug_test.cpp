@@ -37,9 +37,10 @@ Outcome debugged(const Scratch& scratch, const Words& options) {
 }
 
 TEST(Debug, StopsInTheWantedRobotAtTheWantedTime) {
+  // Early: on machines without hardware watchpoints, gdb looks at each of some thousand passes of a tick.
   const Scratch scratch;
   for (const int robot : {1, 9}) {
-    const Outcome outcome = debugged(scratch, {"--robot", std::to_string(robot), "--at", "1", "--command",
+    const Outcome outcome = debugged(scratch, {"--robot", std::to_string(robot), "--at", "0.2", "--command",
                                                "print squares", "--command", "print kilo_ticks"});
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     const int uid = 10 + robot, square = uid * uid;
@@ -47,7 +48,7 @@ TEST(Debug, StopsInTheWantedRobotAtTheWantedTime) {
               std::string::npos)
         << outcome.out << outcome.err;
     EXPECT_NE(outcome.out.find("loop () at ./debugged.c:"), std::string::npos) << outcome.out;
-    EXPECT_NE(outcome.out.find("= 30\n"), std::string::npos) << outcome.out;
+    EXPECT_NE(outcome.out.find("= 6\n"), std::string::npos) << outcome.out;
   }
 }
 
@@ -59,7 +60,7 @@ TEST(Debug, StopsAtALine) {
 
 TEST(Debug, StopsWhereARobotFails) {
   const Scratch scratch;
-  const Outcome outcome = debugged(scratch, {"--robot", "2", "--at", "0.5", "--command", "delete", "--command",
+  const Outcome outcome = debugged(scratch, {"--robot", "2", "--at", "0.1", "--command", "delete", "--command",
                                              "continue", "--command", "print kilo_ticks"});
   EXPECT_NE(outcome.out.find("SIGSEGV"), std::string::npos) << outcome.out << outcome.err;
   EXPECT_NE(outcome.out.find("= 60\n"), std::string::npos) << outcome.out;
