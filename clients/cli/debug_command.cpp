@@ -47,7 +47,8 @@ bool processor_watches() {
   const pid_t child = fork();
   if (child < 0) return false;
   if (child == 0) {
-    ptrace(PTRACE_TRACEME, 0, nullptr, nullptr);
+    // Untraced, it would stop for ever.
+    if (ptrace(PTRACE_TRACEME, 0, nullptr, nullptr) != 0) _exit(1);
     raise(SIGSTOP);
     watched = 1;
     _exit(0);

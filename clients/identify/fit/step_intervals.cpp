@@ -32,10 +32,6 @@ bool is_in_data(const Factor& f, double point) {
 /// Whether the covariate varies continuously: an interval of a count says nothing.
 bool is_continuous(const Axis& axis) { return *unit_of(axis.of) != 0; }
 
-bool is_of_neighbours(const Axis& axis) {
-  return axis.of >= Covariate::kNeighbours && axis.of <= Covariate::kBearing;
-}
-
 std::vector<StepInterval> steps_of(const MotionModel& model) {
   std::vector<StepInterval> all;
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
@@ -60,7 +56,7 @@ std::vector<StepInterval> radii_of(const MotionModel& model) {
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
     for (const Block& block : model.terms[t].blocks) {
       for (const Factor& f : block.basis.factors) {
-        if (!is_of_neighbours(f.axis) || reach_mm(f.axis) > kListed_mm) continue;
+        if (!is_of_others(f.axis) || reach_mm(f.axis) > kListed_mm) continue;
         const double reach = reach_mm(f.axis);
         const bool known = std::any_of(all.begin(), all.end(),
                                        [&](const StepInterval& s) { return s.term == t && s.at == reach; });
@@ -73,7 +69,7 @@ std::vector<StepInterval> radii_of(const MotionModel& model) {
 
 /// Whether this radius is that of a factor.
 bool is_radius_of(const StepInterval& step, const Factor& f) {
-  return step.is_radius && is_of_neighbours(f.axis) && reach_mm(f.axis) == step.at;
+  return step.is_radius && is_of_others(f.axis) && reach_mm(f.axis) == step.at;
 }
 
 /// The columns of a block that jump at a step, or depend on a radius, as flags of all products of the basis; empty: none.

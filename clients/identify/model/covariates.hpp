@@ -124,6 +124,10 @@ struct Axis {
   bool operator==(const Axis&) const = default;
 };
 
+/// Whether the covariate is one of the robots nearby, with a radius.
+[[nodiscard]] constexpr bool is_of_others(const Axis& axis) {
+  return axis.of >= Covariate::kNeighbours && axis.of <= Covariate::kBearing;
+}
 /// Whether only some of the neighbours count.
 [[nodiscard]] constexpr bool is_of_some(const Axis& axis) {
   return axis.others != Others::kAny || axis.only_robot > 0;

@@ -48,8 +48,6 @@ Function::Covariate covariate_of(Covariate c) {
 }
 
 bool is_motor_time(Covariate c) { return c >= Covariate::kMotorTime && c <= Covariate::kDrivenTime; }
-bool is_of_neighbours(Covariate c) { return c >= Covariate::kNeighbours && c <= Covariate::kBearing; }
-
 /// A situation in which one or two covariates have given values. The other values do not matter.
 Situation with(const Axis& axis, double value, Situation s = {}) {
   switch (axis.of) {
@@ -100,7 +98,7 @@ double sum_at(const Factor& factor, const Eigen::VectorXd& coefficients, const S
 
 void set_axis(Function& function, const Factor& factor) {
   function.set_of(covariate_of(factor.axis.of));
-  if (is_of_neighbours(factor.axis.of)) {
+  if (is_of_others(factor.axis)) {
     function.set_radius_mm(reach_mm(factor.axis));
     if (factor.axis.others == Others::kDriven) function.set_others(Function::DRIVEN_OTHERS);
     if (factor.axis.others == Others::kResting) function.set_others(Function::RESTING_OTHERS);

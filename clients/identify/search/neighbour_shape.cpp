@@ -28,10 +28,7 @@ constexpr std::array<std::uint8_t, 2> kFoci = {1, 4};
 
 /// Whether a block depends on neighbours only.
 bool is_of_neighbours(const Block& block) {
-  const auto neighbours = [](const Factor& f) {
-    return f.known.empty() && (f.axis.of == Covariate::kNeighbours || f.axis.of == Covariate::kNearest ||
-                               f.axis.of == Covariate::kDensity || f.axis.of == Covariate::kBearing);
-  };
+  const auto neighbours = [](const Factor& f) { return f.known.empty() && is_of_others(f.axis); };
   const std::vector<Factor>& factors = block.basis.factors;
   return (block.target == Target::kGain || block.target == Target::kAhead || block.target == Target::kTurn ||
           block.target == Target::kSideways) &&
