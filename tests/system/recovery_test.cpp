@@ -49,8 +49,9 @@ class Recoveries : public testing::Test {
   Scratch scratch;
 };
 
-/// It loses the register by which the way back to the host is found: a wild pointer does not hit the host for certain.
-constexpr const char* kKillHost = "__asm__ volatile(\"mov %0, %%gs\" : : \"r\"(0));";
+/// It overwrites the address to which the robot's code returns in the host: a wild pointer does not hit the host for certain. Nor
+/// does the loss of %gs, which some kernels restore when they switch to another process.
+constexpr const char* kKillHost = "void** host; __asm__ volatile(\"mov %%gs:0, %0\" : \"=r\"(host)); host[6] = 0;";
 
 TEST_F(Recoveries, ACrashedHostFailsTheRobotThatCausedItAlone) {
   const std::string kills = behaviour("kills", kKillHost), faults = behaviour("faults", "*(volatile int*)8 = 1;");
