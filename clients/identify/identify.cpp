@@ -13,8 +13,8 @@
 #include "clients/identify/last_check.hpp"
 #include "clients/identify/model/model_file.hpp"
 #include "clients/identify/replay/simulation_check.hpp"
+#include "clients/identify/search/floor_parts.hpp"
 #include "clients/identify/search/products.hpp"
-#include "clients/identify/search/standing_circles.hpp"
 #include "clients/identify/unexplained/prediction_windows.hpp"
 #include "core/base/error.hpp"
 
@@ -171,7 +171,7 @@ Search found_by_search(const Fitter& fitter, const FitState& base, const Measure
   found = search(fitter, base, log, leaves_much);
   log.begin(kTermChecks, "search", "checking each effect", found.fit.model.terms.size());
   keep_predictive_terms(fitter, train, times, found);
-  fit_circles(fitter, found);
+  fit_floor_parts(fitter, found);
   return found;
 }
 

@@ -58,6 +58,7 @@ std::uint32_t Covariates::need(Covariate covariate, const FunctionSettings& func
   Column column;
   column.covariate = covariate;
   if (covariate == Covariate::kPointDistance) column.point = function.point;
+  if (covariate == Covariate::kAlong) kt_sincos(function.along_deg * (kPi / 180), &column.along_y, &column.along_x);
   if (is_of_neighbours(covariate)) {
     column.radius_mm = function.radius_mm;
     column.others = function.others;
@@ -83,7 +84,8 @@ std::uint32_t Covariates::need(Covariate covariate, const FunctionSettings& func
     const Column& known = columns_[i];
     if (known.covariate == covariate && known.radius_mm == column.radius_mm && known.forget_s == column.forget_s &&
         known.focus == column.focus && known.toward_rad == column.toward_rad && known.field == column.field &&
-        known.others == column.others && known.other_robots == column.other_robots && known.point == column.point) {
+        known.others == column.others && known.other_robots == column.other_robots && known.point == column.point &&
+        known.along_x == column.along_x && known.along_y == column.along_y) {
       return i;
     }
   }
@@ -118,6 +120,10 @@ Range Covariates::range(std::uint32_t index) const {
                    growth_mm = p.growth_mm_s * duration_s;
       return {-std::max(growth_mm, 0.0),
               __builtin_sqrt(away_x_mm * away_x_mm + away_y_mm * away_y_mm) - std::min(growth_mm, 0.0)};
+    }
+    case Covariate::kAlong: {
+      const double most_mm = x_mm * magnitude(column.along_x) + y_mm * magnitude(column.along_y);
+      return {-most_mm, most_mm};
     }
     case Covariate::kHeading:
     case Covariate::kNearestBearing: return {-kPi, kPi};
@@ -194,6 +200,8 @@ void Covariates::fill(Column& column, Tick now, const RobotColumns& robots, std:
         return __builtin_sqrt(dx * dx + dy * dy) - p.growth_mm_s * time_s;
       });
     }
+    case Covariate::kAlong:
+      return each([&](std::size_t r) { return column.along_x * robots.x_mm[r] + column.along_y * robots.y_mm[r]; });
     case Covariate::kHeading: return each([&](std::size_t r) { return robots.heading_rad[r]; });
     case Covariate::kCommand:
       return each([&](std::size_t r) { return static_cast<double>(command_of(robots.duties[r])); });

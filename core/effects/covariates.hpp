@@ -46,6 +46,7 @@ class Covariates {
     std::uint32_t field = 0;
     std::uint32_t slot = 0;  ///< of the memory, for covariates that are stored there
     MovingPointSettings point = {};
+    double along_x = 1, along_y = 0;  ///< unit vector, with kAlong
     std::vector<double> values;
   };
 

@@ -173,6 +173,8 @@ class EffectCheck {
            function.has_point()
                ? "point has no effect here; it goes with of: POINT_DISTANCE"
                : "point is missing; state the centre of the circles, point { x_mm: ... y_mm: ... }");
+    demand(!function.has_along_deg() || any([](Function::Covariate c) { return c == Function::ALONG; }),
+           path + ".along_deg", "along_deg has no effect here; it goes with of: ALONG");
     demand(!of_place || fields_.contains(function.field()), path + ".field",
            fmt::format("there is no arena field \"{}\"; add field {{ name: \"{}\" }}, or name one that is there",
                        one_line(function.field(), 60), one_line(function.field(), 60)));

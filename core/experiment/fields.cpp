@@ -96,6 +96,7 @@ constexpr FieldRule kRules[] = {
     {"Function.forget_s", 0, kLongest_s, "s"},
     {"Function.focus", 0, 16, ""},
     {"Function.toward_deg", -360, 360, "degrees"},
+    {"Function.along_deg", -360, 360, "degrees"},
     {"Function.other_robot", 0, kMostRobots - 1, ""},
     {"MovingPoint.x_mm", -kLongest_mm, kLongest_mm, "mm"},
     {"MovingPoint.y_mm", -kLongest_mm, kLongest_mm, "mm"},

@@ -46,7 +46,8 @@ enum class Covariate : std::uint8_t {
   kEarlierTurn,
   kCommandCount,
   kMotorTimeSum,
-  kPointDistance
+  kPointDistance,
+  kAlong
 };
 
 /// The centre of circles that move and grow. A circle of constant kPointDistance c has the radius c + growth_mm_s t.
@@ -101,6 +102,7 @@ struct FunctionSettings {
   double forget_s = 0;
   std::uint32_t focus = 0;
   double toward_deg = 0;
+  double along_deg = 0;  ///< with kAlong
   Others others = Others::kAny;
   std::vector<std::uint32_t>
       other_robots;           ///< numbers of the only robots that count as neighbours, ascending; empty: all

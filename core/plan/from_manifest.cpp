@@ -352,6 +352,7 @@ FunctionSettings settings_of(const proto::Function& function) {
   out.forget_s = function.forget_s();
   out.focus = function.focus();
   out.toward_deg = function.toward_deg();
+  out.along_deg = function.along_deg();
   out.others = static_cast<Others>(function.others());
   out.other_robots = {function.other_robot().begin(), function.other_robot().end()};
   std::sort(out.other_robots.begin(), out.other_robots.end());

@@ -138,6 +138,35 @@ TEST(HeldNumbers, BlocksSumToTheValue) {
   EXPECT_EQ(sum(0, 0), 0);
 }
 
+TEST(HeldNumbers, ADirectionIsOne) {
+  Factor f;
+  f.shape = Factor::Shape::kCosines;
+  f.axis = {Covariate::kAlong};
+  f.axis.along_rad = 0.4;
+  f.low = -300;
+  f.high = 300;
+  f.count = 2;
+  MotionModel model;
+  model.terms.push_back(term_of(f, 0.3));
+  const HeldNumbers held = held_numbers_of(model, {100, 400});
+  ASSERT_EQ(held.size(), 1);
+  EXPECT_EQ(held.numbers[0].name, "direction");
+  EXPECT_EQ(held.numbers[0].value, 0.4);
+  Situation s;
+  s.x_mm = 150;
+  s.y_mm = -90;
+  Factor turn = f;
+  turn.shape = Factor::Shape::kPointShift;
+  turn.points = {0.3, 0.3};
+  double derivative = 0;
+  turn.evaluate(s, 0, &derivative);
+  Eigen::VectorXd columns(static_cast<Eigen::Index>(held.columns.blocks.size()));
+  for (Eigen::Index i = 0; i < columns.size(); ++i)
+    held.columns.blocks[static_cast<std::size_t>(i)].basis.evaluate(s, 0, &columns[i]);
+  EXPECT_NEAR((held.columns.weights.transpose() * columns)[0], derivative / Factor::kDirectionUnit_rad,
+              1e-3 * std::abs(derivative) / Factor::kDirectionUnit_rad);
+}
+
 TEST(HeldNumbers, OfACentreAreDifferences) {
   Factor f;
   f.shape = Factor::Shape::kCosines;

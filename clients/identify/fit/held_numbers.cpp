@@ -107,6 +107,16 @@ void add_centre(std::vector<MovableNumber>& to, const Factor& f, const DataExten
   if (point.growth_mm_s != 0) add("growth", "mm/s", &MovingPoint::growth_mm_s, kStep_mm / extent.duration_s);
 }
 
+void add_direction(std::vector<MovableNumber>& to, const Factor& f, const DataExtent& extent) {
+  const double along_rad = f.axis.along_rad;
+  constexpr double kStep_mm = 1;
+  to.push_back({"direction", "rad", along_rad, kStep_mm / extent.half_side_mm,
+                [along_rad](const Factor& other) {
+                  return other.axis.of == Covariate::kAlong && other.axis.along_rad == along_rad;
+                },
+                [](Factor& moved, double by) { moved.axis.along_rad += by; }});
+}
+
 void add_wave(std::vector<MovableNumber>& to, const Factor& f, const DataExtent& extent) {
   const std::vector<double> points = f.points;
   constexpr double kStep_rad = 0.02;
@@ -142,6 +152,7 @@ std::vector<MovableNumber> movable_numbers(const Term& term, const DataExtent& e
     for (const Factor& f : block.basis.factors) {
       if (std::any_of(all.begin(), all.end(), [&](const MovableNumber& n) { return n.is_in(f); })) continue;
       if (f.axis.of == Covariate::kPointDistance) add_centre(all, f, extent);
+      if (f.axis.of == Covariate::kAlong) add_direction(all, f, extent);
       if (f.shape == Shape::kTravelling) add_wave(all, f, extent);
       const bool one = f.points.size() == 1;
       if (one && (f.shape == Shape::kExponential || f.shape == Shape::kLevelling)) add_scale(all, f, "decay");

@@ -61,7 +61,7 @@ std::size_t Factor::columns() const {
     case Shape::kExponential:
     case Shape::kLevelling: return points.size();
     case Shape::kWave: return 2 * points.size();
-    case Shape::kPointShift: return 5;
+    case Shape::kPointShift: return axis.of == Covariate::kAlong ? 1 : 5;
   }
   return 0;
 }
@@ -162,8 +162,7 @@ void Factor::columns_at(double c, double d, double span_s, double* to) const {
 }
 
 void Factor::shifted(double c, const Situation& s, double* to) const {
-  const double u = (c - low) / (high - low), dx = s.x_mm - axis.point.x_mm_at(s.time_s),
-               dy = s.y_mm - axis.point.y_mm_at(s.time_s), distance = std::max(std::hypot(dx, dy), 1e-6);
+  const double u = (c - low) / (high - low);
   double slope = 0;  // per mm; 0 beyond the range, where the curve is constant
   if (u > 0 && u < 1) {
     for (std::size_t k = 0; k < points.size(); ++k) {
@@ -171,7 +170,13 @@ void Factor::shifted(double c, const Situation& s, double* to) const {
       slope -= points[k] * wave * std::sin(wave * u) / (high - low);
     }
   }
-  const double time = s.time_s / count;
+  if (axis.of == Covariate::kAlong) {
+    const double across_mm = s.y_mm * std::cos(axis.along_rad) - s.x_mm * std::sin(axis.along_rad);
+    to[0] = slope * across_mm * kDirectionUnit_rad;
+    return;
+  }
+  const double dx = s.x_mm - axis.point.x_mm_at(s.time_s), dy = s.y_mm - axis.point.y_mm_at(s.time_s),
+               distance = std::max(std::hypot(dx, dy), 1e-6), time = s.time_s / count;
   to[0] = -slope * dx / distance;
   to[1] = -slope * dy / distance;
   to[2] = to[0] * time;

@@ -24,10 +24,12 @@ struct Factor {
     kWave,          ///< cos and sin of 2 pi c / point, two columns per point
     /// cos(k p), sin(k p), k = first.., with the phase p = points[0] x + points[1] y - points[2] t, in rad, mm and s
     kTravelling,
-    /// Derivatives of the curve sum of points[k] cos((first + k) pi u) over kPointDistance by the numbers of its point: x, y,
-    /// velocity_x, velocity_y, growth; five columns, the last three over a unit of `count` s
+    /// Derivatives of the curve sum of points[k] cos((first + k) pi u). Over kPointDistance by the numbers of its point: x, y,
+    /// velocity_x, velocity_y, growth; five columns, the last three over a unit of `count` s. Over kAlong by its direction; one column,
+    /// over kDirectionUnit_rad
     kPointShift,
   };
+  static constexpr double kDirectionUnit_rad = 1e-3;
   Shape shape = Shape::kLinear;
   Axis axis, and_axis;
   double low = 0, high = 1, and_low = 0, and_high = 1;

@@ -255,6 +255,9 @@ void widen(Factor& f, double factor, double middle_x_mm, double middle_y_mm) {
     switch (axis.of) {
       case Covariate::kX: middle = middle_x_mm; break;
       case Covariate::kY: middle = middle_y_mm; break;
+      case Covariate::kAlong:
+        middle = middle_x_mm * std::cos(axis.along_rad) + middle_y_mm * std::sin(axis.along_rad);
+        break;
       case Covariate::kRadius:
       case Covariate::kPointDistance: break;
       default: return;

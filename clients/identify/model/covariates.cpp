@@ -92,6 +92,7 @@ const char* name_of(Covariate of) {
     case Covariate::kRobot: return "robot";
     case Covariate::kRun: return "run";
     case Covariate::kPointDistance: return "point_distance";
+    case Covariate::kAlong: return "along";
   }
   return "";
 }
@@ -113,7 +114,8 @@ const char* unit_of(Covariate of) {
     case Covariate::kY:
     case Covariate::kRadius:
     case Covariate::kNearest:
-    case Covariate::kPointDistance: return "mm";
+    case Covariate::kPointDistance:
+    case Covariate::kAlong: return "mm";
     case Covariate::kHeading:
     case Covariate::kBearing: return "rad";
     default: return "";
@@ -165,6 +167,7 @@ double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
     case Covariate::kPointDistance:
       return std::hypot(s.x_mm - axis.point.x_mm_at(s.time_s), s.y_mm - axis.point.y_mm_at(s.time_s)) -
              axis.point.growth_mm_s * s.time_s;
+    case Covariate::kAlong: return s.x_mm * std::cos(axis.along_rad) + s.y_mm * std::sin(axis.along_rad);
   }
   return 0;
 }

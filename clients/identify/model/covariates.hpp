@@ -85,6 +85,7 @@ enum class Covariate : std::uint8_t {
   kRobot,
   kRun,
   kPointDistance,  ///< distance from Axis::point, less its growth
+  kAlong,          ///< coordinate along the direction Axis::along_rad
 };
 
 /// Name as in model files (Function.Covariate in idl/effects.proto), in lower case; and the unit of its values, empty: a number or a key.
@@ -120,6 +121,7 @@ struct Axis {
   std::uint32_t only_robot = 0;  ///< 1 + number of the only robot that counts; 0: all
   /// For kPointDistance.
   MovingPoint point = {};
+  double along_rad = 0;  ///< for kAlong: from the x axis
 
   bool operator==(const Axis&) const = default;
 };

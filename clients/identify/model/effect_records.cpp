@@ -43,6 +43,7 @@ Function::Covariate covariate_of(Covariate c) {
     case Covariate::kRobot: return Function::ROBOT;
     case Covariate::kRun: return Function::RUN;
     case Covariate::kPointDistance: return Function::POINT_DISTANCE;
+    case Covariate::kAlong: return Function::ALONG;
   }
   return Function::NOTHING;
 }
@@ -85,6 +86,10 @@ Situation with(const Axis& axis, double value, Situation s = {}) {
       s.y_mm = axis.point.y_mm_at(s.time_s);
       break;
     }
+    case Covariate::kAlong:
+      s.x_mm = value * std::cos(axis.along_rad);
+      s.y_mm = value * std::sin(axis.along_rad);
+      break;
     default: break;
   }
   return s;
@@ -117,6 +122,7 @@ void set_axis(Function& function, const Factor& factor) {
     point.set_velocity_y_mm_s(rounded(from.velocity_y_mm_s));
     point.set_growth_mm_s(rounded(from.growth_mm_s));
   }
+  if (factor.axis.of == Covariate::kAlong) function.set_along_deg(rounded(factor.axis.along_rad * (180 / M_PI)));
   if (factor.axis.of == Covariate::kTraffic) function.set_field(field_name(factor.axis.radius));
   if (is_motor_time(factor.axis.of) && factor.axis.decay_index > 0)
     function.set_forget_s(kDecayTimes_s[factor.axis.decay_index - 1u]);

@@ -57,6 +57,7 @@ Unit unit_of(Function::Covariate of) {
     case Function::Y:
     case Function::RADIUS:
     case Function::POINT_DISTANCE:
+    case Function::ALONG:
     case Function::NEAREST: return {"mm", 1};
     case Function::HEADING:
     case Function::NEAREST_BEARING: return {"degrees", kDegrees};
@@ -84,6 +85,7 @@ const char* name_of(Function::Covariate of) {
     case Function::Y: return "y";
     case Function::RADIUS: return "radius";
     case Function::POINT_DISTANCE: return "distance from the moving centre";
+    case Function::ALONG: return "place along a direction";
     case Function::NEAREST: return "nearest";
     case Function::NEAREST_BEARING: return "bearing";
     case Function::HEADING: return "heading";

@@ -19,7 +19,8 @@ std::pair<std::string, std::string> covariate_words(Covariate covariate) {
     case Covariate::kX:
     case Covariate::kY:
     case Covariate::kRadius:
-    case Covariate::kPointDistance: return {"position", "position"};
+    case Covariate::kPointDistance:
+    case Covariate::kAlong: return {"position", "position"};
     case Covariate::kHeading: return {"heading", "heading"};
     case Covariate::kCommand: return {"command", "command"};
     case Covariate::kSinceCommand: return {"time-since-command", "time_since_command"};

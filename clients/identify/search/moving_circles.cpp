@@ -151,6 +151,12 @@ MovingPoint shifted_centre(MovingPoint p, const Eigen::VectorXd& step_mm, double
   return p;
 }
 
+Axis about(const MovingPoint& centre) {
+  Axis axis{Covariate::kPointDistance};
+  axis.point = centre;
+  return axis;
+}
+
 /// Whether a circle changes so little during a run that the scan would have left it out.
 bool hardly_moves(const MovingPoint& p, const Extent& extent) {
   return extent.duration_s * (std::hypot(p.velocity_x_mm_s, p.velocity_y_mm_s) + std::abs(p.growth_mm_s)) <
@@ -191,18 +197,18 @@ bool set_still(const Fitter& fitter, FitState& state, std::size_t place, double 
 
 }  // namespace
 
-Factor curve_about(const FitState& state, const MovingPoint& centre, std::uint32_t count) {
-  Factor curve = over(Factor::Shape::kCosines, Covariate::kPointDistance, 1e300, -1e300, count);
-  curve.axis.point = centre;
+Factor curve_over(const FitState& state, const Axis& axis, std::uint32_t count) {
+  Factor curve = over(Factor::Shape::kCosines, axis.of, 1e300, -1e300, count);
+  curve.axis = axis;
   for (const TrackView& view : state.tracks.views()) {
     Situation s;
     for (const Sample& sample : view.track->samples) {
       s.time_s = sample.time_s;
       s.x_mm = sample.x_mm;
       s.y_mm = sample.y_mm;
-      const double distance = value_of(curve.axis, s, 0);
-      curve.low = std::min(curve.low, distance);
-      curve.high = std::max(curve.high, distance);
+      const double at_mm = value_of(curve.axis, s, 0);
+      curve.low = std::min(curve.low, at_mm);
+      curve.high = std::max(curve.high, at_mm);
     }
   }
   return curve;
@@ -269,7 +275,7 @@ Dictionary dictionary_of_circles(const FitState& state, const Extent& extent,
   const double raster = static_cast<double>(raster_of(extent).size()), choices = raster * raster;
   constexpr std::uint32_t kColumns = 16;
   for (const MovingCircle& circle : circles) {
-    const auto bases = make.put(kSpeed, Basis{{curve_about(state, circle.centre, kColumns)}});
+    const auto bases = make.put(kSpeed, Basis{{curve_over(state, about(circle.centre), kColumns)}});
     for (const Eigen::Index size : {6, 16})
       make.add(kSpeed, "position-and-time", {"position", "time"}, some(bases, 0, size), choices);
   }

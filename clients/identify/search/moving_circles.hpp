@@ -23,10 +23,11 @@ struct MovingCircle {
 /// A hypothesis for each circle: a curve over the distance from its centre.
 [[nodiscard]] Dictionary dictionary_of_circles(const FitState&, const Extent&, const std::vector<MovingCircle>&);
 
-/// A curve over the distance from a centre, over the range that the tracks cover, as cosines.
-[[nodiscard]] Factor curve_about(const FitState&, const MovingPoint& centre, std::uint32_t columns);
+/// A curve over a coordinate of the place, kPointDistance or kAlong, over the range that the tracks cover, as cosines.
+[[nodiscard]] Factor curve_over(const FitState&, const Axis&, std::uint32_t columns);
 
-/// The derivatives of a block's curve by the numbers of its centre: as Factor::Shape::kPointShift, the last three over `unit_s`.
+/// The derivatives of a block's curve by the numbers of its centre or its direction: as Factor::Shape::kPointShift, with velocity
+/// and growth over `unit_s`.
 [[nodiscard]] Block derivatives_of(const Term&, std::size_t block, double unit_s);
 
 /// Whether a term is a curve over the distance from a moving centre.

@@ -40,7 +40,7 @@ Search SearchLoop::run() {
   for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t) {
     simplify(fitter_, out_.fit, t);
     if (!is_constant_drift(out_.fit.model.terms[t])) continue;
-    note_renamed(std::exchange(out_.fit.model.terms[t].name, "drift"), "drift");
+    out_.note_renamed(std::exchange(out_.fit.model.terms[t].name, "drift"), "drift");
     out_.reasons[t].covariates = {"world_frame"};
   }
   out_.work = out_.fit.tracks.work();

@@ -60,6 +60,9 @@ struct Search {
   std::uint64_t work = 0;  ///< PreparedSet::work at its end
   /// With maps and curves where the model has circles and edges; the last check chooses. Nothing: none was replaced.
   std::optional<Stage> with_curves = {};
+
+  /// A term has got the name of another form: steps and ambiguities follow it.
+  void note_renamed(const std::string& from, const std::string& to);
 };
 
 /// Limit of a search: accepted changes without general terms. Each of these allows two more.

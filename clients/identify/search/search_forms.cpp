@@ -22,7 +22,8 @@ constexpr std::size_t kMostTries = 4;
 constexpr std::size_t kEnoughForGeneral = 70000, kEnoughForScreening = 25000;
 
 bool is_of_place(const Axis& axis) {
-  return axis.of == Covariate::kX || axis.of == Covariate::kY || axis.of == Covariate::kPointDistance;
+  return axis.of == Covariate::kX || axis.of == Covariate::kY || axis.of == Covariate::kPointDistance ||
+         axis.of == Covariate::kAlong;
 }
 
 }  // namespace

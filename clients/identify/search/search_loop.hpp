@@ -214,8 +214,6 @@ class SearchLoop {
   /// Replaces curves per robot or command by amplitudes from an instant on, and these by a change of each wheel, if the evidence
   /// rises. Returns whether there is an instant.
   bool became_switch(std::size_t place);
-  /// A term has got the name of another form: steps and ambiguities follow it.
-  void note_renamed(const std::string& from, const std::string& to);
 
   const Fitter& fitter_;
   const WorkLog& log_;

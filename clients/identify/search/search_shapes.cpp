@@ -17,7 +17,7 @@ namespace kilotwin::identify {
 void SearchLoop::refine_shape(std::size_t place) {
   const std::string before = out_.fit.model.terms[place].name;
   refine_form(place);
-  note_renamed(before, out_.fit.model.terms[place].name);
+  out_.note_renamed(before, out_.fit.model.terms[place].name);
 }
 
 void SearchLoop::refine_form(std::size_t place) {
@@ -56,11 +56,11 @@ bool SearchLoop::became_switch(std::size_t place) {
   return true;
 }
 
-void SearchLoop::note_renamed(const std::string& from, const std::string& to) {
+void Search::note_renamed(const std::string& from, const std::string& to) {
   if (from == to) return;
-  for (auto& step : out_.steps)
+  for (Step& step : steps)
     if (step.added == from) step.added = to;
-  for (Ambiguity& one : out_.ambiguous)
+  for (Ambiguity& one : ambiguous)
     if (one.found == from) one.found = to;
 }
 

@@ -42,6 +42,7 @@ Factor richer(Factor f) {
         case Covariate::kTime: f.count = 64; break;
         case Covariate::kX:
         case Covariate::kPointDistance:
+        case Covariate::kAlong:
         case Covariate::kY: f.count = 40; break;
         case Covariate::kSinceCommand:
           f.count = 40;

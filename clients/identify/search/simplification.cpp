@@ -68,7 +68,7 @@ std::vector<SimpleForm> forms_of(const Factor& curve, Target target) {
   const double range = curve.high - curve.low;
   // Covariates that may be negative: an exponential has no start there.
   const bool place = curve.axis.of == Covariate::kX || curve.axis.of == Covariate::kY ||
-                     curve.axis.of == Covariate::kPointDistance;
+                     curve.axis.of == Covariate::kPointDistance || curve.axis.of == Covariate::kAlong;
   for (int i = 0; i < kScales && !place; ++i)
     forms.push_back(form(curve, Shape::kExponential, kScales, {range * std::pow(0.66, i)}));
   // change_points.hpp handles time.

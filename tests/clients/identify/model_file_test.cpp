@@ -99,6 +99,8 @@ std::vector<Form> forms() {
   twice.first = 2;
   Factor circles = over(Shape::kCosines, Covariate::kPointDistance, -60, 400, 4);
   circles.axis.point = {40, -30, 5, -2, 3};
+  Factor along = over(Shape::kCosines, Covariate::kAlong, -250, 250, 3);
+  along.axis.along_rad = 0.7;
   Factor growing = known;
   growing.plus = 0.5;
   return {
@@ -108,6 +110,7 @@ std::vector<Form> forms() {
       {"curve since command", {{late}}},
       {"curve over x", {{over(Shape::kCosines, Covariate::kX, -250, 250, 3)}}},
       {"curve over y", {{over(Shape::kCosines, Covariate::kY, -250, 250, 3)}}},
+      {"curve along a direction", {{along}}},
       {"curve over radius", {{over(Shape::kCosines, Covariate::kRadius, 0, 300, 3)}}},
       {"map", {{map}}},
       {"grid", {{grid}}},

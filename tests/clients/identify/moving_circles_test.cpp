@@ -59,6 +59,36 @@ TEST(MovingCircles, DerivativesByTheCentreMatchDifferences) {
   }
 }
 
+TEST(MovingCircles, TheDerivativeByADirectionMatchesDifferences) {
+  const std::array<double, 3> coefficients{0.3, -0.2, 0.1};
+  Situation s;
+  s.x_mm = 150;
+  s.y_mm = -90;
+  const auto along = [](double rad) {
+    Factor f = curve_about({});
+    f.axis = {Covariate::kAlong};
+    f.axis.along_rad = rad;
+    return f;
+  };
+  const auto value = [&](double rad) {
+    std::array<double, 3> columns;
+    along(rad).evaluate(s, 0, columns.data());
+    double sum = 0;
+    for (std::size_t k = 0; k < 3; ++k) sum += coefficients[k] * columns[k];
+    return sum;
+  };
+  Factor turn = along(0.4);
+  turn.shape = Factor::Shape::kPointShift;
+  turn.points.assign(coefficients.begin(), coefficients.end());
+  ASSERT_EQ(turn.columns(), 1U);
+  double derivative = 0;
+  turn.evaluate(s, 0, &derivative);
+  constexpr double kStep_rad = 1e-6;
+  const double slope = (value(0.4 + kStep_rad) - value(0.4 - kStep_rad)) / (2 * kStep_rad);
+  EXPECT_GT(std::abs(slope), 0.05);
+  EXPECT_NEAR(derivative / Factor::kDirectionUnit_rad, slope, 1e-6);
+}
+
 /// Robots that wander, each in a run of its own, with a slow disc whose centre moves and whose radius grows. It slows every n-th.
 MeasuredSet wandering(const MovingPoint& centre, double radius_mm, double gain, std::uint32_t every = 1) {
   constexpr double kStep_s = 0.02, kDuration_s = 120, kTracker_mm = 0.5;

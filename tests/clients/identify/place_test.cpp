@@ -9,10 +9,11 @@
 
 #include "clients/identify/model/effect_records.hpp"
 #include "clients/identify/model/model_file.hpp"
+#include "clients/identify/search/floor_parts.hpp"
+#include "clients/identify/search/moving_circles.hpp"
 #include "clients/identify/search/neighbour_shape.hpp"
 #include "clients/identify/search/products.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
-#include "clients/identify/search/standing_circles.hpp"
 #include "clients/identify/search/total_variation_map.hpp"
 #include "clients/identify/search/traffic_shape.hpp"
 #include "core/random/random.hpp"
@@ -191,7 +192,7 @@ TEST(Place, PatchesOfTheFloorBecomeCircles) {
       played([&](const Around& a) { return gain(a.x_mm[a.robot], a.y_mm[a.robot]); }, 5, 12, 200);
   const Fitter fitter(set, 2);
   Search found = search_with_map(fitter, set, 5);
-  fit_circles(fitter, found);
+  fit_floor_parts(fitter, found);
   ASSERT_TRUE(found.with_curves);
   EXPECT_NE(found.with_curves->fit.model.terms[0].blocks.front().basis.factors.front().axis.of,
             Covariate::kPointDistance);
@@ -210,14 +211,80 @@ TEST(Place, PatchesOfTheFloorBecomeCircles) {
     EXPECT_NEAR(gain_of(found.fit.model, driven_at(kX_mm[k], kY_mm[k])) / open, kGain[k], 0.03) << k;
 }
 
-TEST(Place, ASlopeOfTheFloorIsNoCircle) {
-  const MeasuredSet set = played([](const Around& a) { return 1 + 0.002 * a.x_mm[a.robot]; }, 6, 12, 150);
+/// The angle between two directions without a sense, rad.
+double between(double a_rad, double b_rad) { return std::abs(std::remainder(a_rad - b_rad, M_PI)); }
+
+TEST(Place, ASlopeOfTheFloorIsACurveAlongADirection) {
+  const double toward_rad = 0.5;
+  const auto gain = [&](double x, double y) {
+    return 1 + 0.002 * (std::cos(toward_rad) * x + std::sin(toward_rad) * y);
+  };
+  const MeasuredSet set =
+      played([&](const Around& a) { return gain(a.x_mm[a.robot], a.y_mm[a.robot]); }, 6, 12, 150);
   const Fitter fitter(set, 2);
   Search found = search_with_map(fitter, set, 3);
-  const std::string before = proto_of(found.fit.model).SerializeAsString();
-  fit_circles(fitter, found);
-  EXPECT_FALSE(found.with_curves);
-  EXPECT_EQ(proto_of(found.fit.model).SerializeAsString(), before);
+  fit_floor_parts(fitter, found);
+  ASSERT_TRUE(found.with_curves);
+  const std::vector<Block>& blocks = found.fit.model.terms[0].blocks;
+  ASSERT_EQ(blocks.size(), 1U);
+  const Factor& curve = blocks.front().basis.factors.front();
+  ASSERT_EQ(curve.axis.of, Covariate::kAlong);
+  EXPECT_EQ(curve.shape, Shape::kCosines);
+  EXPECT_LT(between(curve.axis.along_rad, toward_rad), 0.06);
+  const double middle = gain_of(found.fit.model, driven_at(0, 0));
+  for (const auto& [x, y] : {std::pair{120.0, 0.0}, {-120.0, 60.0}, {0.0, 120.0}})
+    EXPECT_NEAR(gain_of(found.fit.model, driven_at(x, y)) / middle, gain(x, y), 0.03) << x << ' ' << y;
+}
+
+TEST(Place, TheBorderOfTwoFloorsIsAStepAlongADirection) {
+  const MeasuredSet set =
+      played([](const Around& a) { return a.x_mm[a.robot] + 0.5 * a.y_mm[a.robot] < 15 ? 1.0 : 0.5; }, 4, 12, 150);
+  const Fitter fitter(set, 2);
+  Search found = search_with_map(fitter, set, 5);
+  // The search may have found something else that resembles it: a large circle that moves.
+  Search with_circle = found;
+  Axis about{Covariate::kPointDistance};
+  about.point = {-500, -250, 1, 0.5, 1};
+  const Factor curve = curve_over(found.fit, about, 16);
+  with_circle.fit.model.terms = {unfitted(curve)};
+  with_circle.fit.model.terms[0].name = "speed-by-position-and-time";
+  fitter.fit(with_circle.fit, 4);
+  for (Search* const one : {&found, &with_circle}) {
+    fit_floor_parts(fitter, *one);
+    const Term& term = one->fit.model.terms[0];
+    if (one == &with_circle) {
+      EXPECT_EQ(term.name, "speed-by-position");
+      EXPECT_EQ(one->reasons[0].covariates, std::vector<std::string>{"position"});
+    }
+    ASSERT_EQ(term.blocks.size(), 1U);
+    const Factor& edge = term.blocks.front().basis.factors.front();
+    ASSERT_EQ(edge.axis.of, Covariate::kAlong);
+    ASSERT_EQ(edge.shape, Shape::kAtLeast);
+    EXPECT_LT(between(edge.axis.along_rad, std::atan2(0.5, 1)), 0.03);
+    EXPECT_NEAR(std::abs(edge.points.front()), 15 / std::hypot(1, 0.5), 4);
+    EXPECT_NEAR(gain_of(one->fit.model, driven_at(120, 0)) / gain_of(one->fit.model, driven_at(-120, 0)), 0.5,
+                0.03);
+  }
+}
+
+TEST(Place, APeakBesideABorderIsADiscAndAStep) {
+  const auto gain = [](double x, double y) {
+    return (x < -60 ? 0.5 : 1) * (1 + 0.3 * std::exp(-(std::pow(x - 60, 2) + std::pow(y - 20, 2)) / 8000));
+  };
+  const MeasuredSet set =
+      played([&](const Around& a) { return gain(a.x_mm[a.robot], a.y_mm[a.robot]); }, 5, 12, 200);
+  const Fitter fitter(set, 2);
+  Search found = search_with_map(fitter, set, 5);
+  fit_floor_parts(fitter, found);
+  ASSERT_TRUE(found.with_curves);
+  std::vector<Covariate> of;
+  for (const Block& block : found.fit.model.terms[0].blocks) of.push_back(block.basis.factors.front().axis.of);
+  EXPECT_NE(std::find(of.begin(), of.end(), Covariate::kAlong), of.end());
+  EXPECT_NE(std::find(of.begin(), of.end(), Covariate::kPointDistance), of.end());
+  const double open = gain_of(found.fit.model, driven_at(0, -150));
+  for (const auto& [x, y] : {std::pair{60.0, 20.0}, {-100.0, 20.0}, {-80.0, -80.0}, {110.0, 70.0}})
+    EXPECT_NEAR(gain_of(found.fit.model, driven_at(x, y)) / open, gain(x, y) / gain(0, -150), 0.05)
+        << x << ' ' << y;
 }
 
 TEST(Place, TablesOfProductsGetTheValuesOfAllRobots) {

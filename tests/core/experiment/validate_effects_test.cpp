@@ -42,6 +42,14 @@ TEST_F(ValidateEffects, DistancesNeedTheirPoint) {
             "e.txtpb:3:19: point has no effect here; it goes with of: POINT_DISTANCE");
 }
 
+TEST_F(ValidateEffects, ADirectionGoesWithPlacesAlongIt) {
+  const std::string head = kRobots + "effect { name: 'a' acts_on: WHEEL_GAIN\n function { ";
+  EXPECT_EQ(check_error(head + "of: ALONG along_deg: 30 linear { } } }"), "");
+  EXPECT_EQ(check_error(head + "of: ALONG linear { } } }"), "");
+  EXPECT_EQ(check_error(head + "of: X along_deg: 30 linear { } } }"),
+            "e.txtpb:3:19: along_deg has no effect here; it goes with of: ALONG");
+}
+
 TEST_F(ValidateEffects, EpisodesNeedRateAndLength) {
   const std::string head =
       kRobots + "effect { name: 'a' acts_on: WHEEL_GAIN function { constant: -1 }\n function { ";

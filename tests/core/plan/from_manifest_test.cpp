@@ -57,7 +57,8 @@ TEST(FromManifest, EveryCovariateOfTheSchemaHasAnEnumerator) {
       {F::MOTOR_TIME_SUM, Covariate::kMotorTimeSum},
       {F::EARLIER_TURN, Covariate::kEarlierTurn},
       {F::COMMAND_COUNT, Covariate::kCommandCount},
-      {F::POINT_DISTANCE, Covariate::kPointDistance}};
+      {F::POINT_DISTANCE, Covariate::kPointDistance},
+      {F::ALONG, Covariate::kAlong}};
   ASSERT_EQ(static_cast<int>(pairs.size()), F::Covariate_descriptor()->value_count());
   for (const auto& [schema, plain] : pairs) {
     F function;

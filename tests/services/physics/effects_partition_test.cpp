@@ -29,6 +29,7 @@ std::string with(const std::string& covariate, const std::string& radius_mm = "8
   if (covariate == "PLACE") return " field: 'driven'";
   if (covariate == "POINT_DISTANCE")
     return " point { x_mm: 50 y_mm: -20 velocity_x_mm_s: 9 velocity_y_mm_s: -4 growth_mm_s: 6 }";
+  if (covariate == "ALONG") return " along_deg: 37";
   const bool of_neighbours = covariate == "NEIGHBOURS" || covariate == "NEAREST" || covariate == "DENSITY" ||
                              covariate == "NEAREST_BEARING";
   return of_neighbours ? " radius_mm: " + radius_mm : "";

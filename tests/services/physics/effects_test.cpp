@@ -303,6 +303,18 @@ TEST(Effects, DistancesFromAMovingPointMatchTheirDefinition) {
   }
 }
 
+TEST(Effects, PlacesAlongADirectionMatchTheirDefinition) {
+  const RunPlan plan =
+      make_plan(shown(thousandth("ALONG", "along_deg: 30")), {{100, 0, 0}, {0, 100, 0}, {-60, 80, 0}});
+  Swarm swarm(plan);
+  const std::vector<ScenePose> before = swarm.poses();
+  swarm.run(1);
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const double along_mm = before[i].x_mm * std::cos(M_PI / 6) + before[i].y_mm * std::sin(M_PI / 6);
+    EXPECT_NEAR(swarm.poses()[i].x_mm, before[i].x_mm + kTick_s * along_mm / 1000, 1e-9) << i;
+  }
+}
+
 TEST(Effects, EpisodesHaveTheStatedRateAndDuration) {
   // 200 robots for 1000 s: mean interval 8 s, mean duration 4 / (3 - 1) s, so an episode is on for a fifth of the time.
   constexpr std::uint32_t kRobots = 200;
