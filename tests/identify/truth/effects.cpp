@@ -230,6 +230,20 @@ Effect slow_strip(double strength) {
           {}};
 }
 
+Effect other_floor(double strength) {
+  return {"other-floor",
+          "speed is multiplied by 0.6 where 0.8 x + 0.6 y > 70 mm, and by 1 + 0.3 / (1 + (r / 110 mm)^4), r from "
+          "(-120, 90) mm",
+          {{"position"}},
+          {"robot", "measurement"},
+          [=](const Situation& at, Push& push) {
+            if (0.8 * at.disc.x + 0.6 * at.disc.y > 70) slow_both(push, 1 - 0.4 * strength);
+            const double r = std::hypot(at.disc.x + 120, at.disc.y - 90);
+            slow_both(push, 1 + 0.3 * strength / (1 + std::pow(r / 110, 4)));
+          },
+          {}};
+}
+
 Effect grain(double strength) {
   return {"grain",
           "speed is 1 - 0.38 |cos(heading - 0.7)|^5",

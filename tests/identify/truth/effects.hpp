@@ -18,6 +18,7 @@ Effect slow_start(double strength = 1);              // a motion starts slowly, 
 Effect slow_patch(double strength = 1);        // an oval patch of rough floor
 Effect slower_outside(double strength = 1);    // speed falls towards the boundary, similar to a lens
 Effect slow_strip(double strength = 1);        // a strip of another floor across the arena
+Effect other_floor(double strength = 1);       // another floor beyond an oblique line, beside a smooth bump
 Effect grain(double strength = 1);             // the floor is slower against its grain
 Effect vortex(double strength = 1);            // air rotates about a point of the arena
 Effect warming_patch(double strength = 1);     // a patch becomes warm and slow within the first minutes

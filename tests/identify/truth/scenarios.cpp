@@ -64,6 +64,8 @@ const Entry kEntries[] = {
      [] { return with(tidy_lab(), Effects{slower_outside()}); }},
     {"strip", "position: a strip of another floor, with straight edges",
      [] { return with(tidy_lab(), Effects{slow_strip()}); }},
+    {"other-floor", "position: another floor beyond an oblique line, and a smooth bump",
+     [] { return with(tidy_lab(), Effects{other_floor()}); }},
     {"lens", "measurement: a lens", [] { return with(tidy_lab(), Effects{lens()}); }},
     {"pincushion-blind", "measurement: the other lens, no headings",
      [] { return with(blind_lab(), Effects{pincushion()}); }},
