@@ -122,7 +122,8 @@ void set_axis(Function& function, const Factor& factor) {
     point.set_velocity_y_mm_s(rounded(from.velocity_y_mm_s));
     point.set_growth_mm_s(rounded(from.growth_mm_s));
   }
-  if (factor.axis.of == Covariate::kAlong) function.set_along_deg(rounded(factor.axis.along_rad * (180 / M_PI)));
+  if (factor.axis.of == Covariate::kAlong)
+    function.set_along_deg(rounded(std::remainder(factor.axis.along_rad * (180 / M_PI), 360)));
   if (factor.axis.of == Covariate::kTraffic) function.set_field(field_name(factor.axis.radius));
   if (is_motor_time(factor.axis.of) && factor.axis.decay_index > 0)
     function.set_forget_s(kDecayTimes_s[factor.axis.decay_index - 1u]);

@@ -187,6 +187,9 @@ std::string of_function(const Function& f, Effect::Target target) {
     }
     case Function::kSteps: {
       std::vector<std::string> parts;
+      if (f.steps().at_size() > 0 && f.steps().value(0) != 0)
+        parts.push_back(
+            fmt::format("{} up to {}", signed_size(f.steps().value(0), target), place(f.steps().at(0), f)));
       for (int i = 0; i < std::min(f.steps().at_size(), 3); ++i)
         parts.push_back(
             fmt::format("{} from {} on", signed_size(f.steps().value(i + 1), target), place(f.steps().at(i), f)));
@@ -270,7 +273,10 @@ std::string which_of(const Effect& effect) {
     parts.emplace_back(effect.direction_deg() == 90 ? "to the left" : "ahead");
   if (effect.during_size() == 1) parts.emplace_back(fmt::format("going {}", command_name(effect.during(0))));
   for (const Function& f : effect.function())
-    if (f.has_point()) parts.push_back(point_in_words(f.point()));
+    if (f.has_point())
+      parts.push_back(point_in_words(f.point()));
+    else if (f.of() == Function::ALONG)
+      parts.push_back(fmt::format("along {:.0f} degrees from the x axis", f.along_deg()));
   // With other factors in the product: the value at their full strength.
   for (const Function& f : effect.function()) {
     if (f.focus() > 0)

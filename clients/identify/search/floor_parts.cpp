@@ -79,8 +79,8 @@ std::optional<MapPart> next_part(std::vector<MapPoint> left, const Term* parts, 
   return takes_half ? half : disc;
 }
 
-/// The edge of the last part that explains most of what the other parts leave of the map, and the share of the variance of that part's
-/// curve that a step there explains.
+/// The edge of the last part: the one that explains most of what the other parts leave of the map. Then the share of the variance of
+/// that part's curve that a step there explains.
 std::pair<double, double> edge_of_last(const std::vector<MapPoint>& map, const Term& parts, Target target) {
   const std::size_t last = parts.blocks.size() - 1;
   const Axis& axis = axis_of(parts.blocks[last]);
