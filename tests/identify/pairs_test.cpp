@@ -76,5 +76,13 @@ TEST(Drifts, AfterOneKindOfCommand) {
   EXPECT_EQ(found_in(scene), "drift-by-previous-command");
 }
 
+TEST(Slips, FadeAfterOneKindOfCommand) {
+  const truth::Scene scene = large([](const truth::Situation& at, truth::Push& push) {
+    if (at.driven() && at.before == truth::Motion::kLeft)
+      push.slip_mm_s.y -= 1.8 * std::exp(-at.since_change_s / 3);
+  });
+  EXPECT_EQ(found_in(scene), "slip-by-previous-command");
+}
+
 }  // namespace
 }  // namespace kilotwin

@@ -188,13 +188,15 @@ void add_history_hypotheses(DictionaryBuilder& make, const Extent& extent) {
       after(bases, 0, keys);
     }
   }
-  // A drift after one kind of command, or after any.
-  const auto drift = make.put(kWorld, Basis{{which, since}});
-  for (Eigen::Index key = 0; key < keys; ++key)
-    if (before[static_cast<std::size_t>(key)] != kNoCommand)
-      make.add(kWorld, "previous-command", {"history", "time_since_command"}, some(drift, key * kCurve, kCurve),
-               static_cast<double>(keys));
-  make.add(kWorld, "previous-command", {"history", "time_since_command"}, some(drift, 0, keys * kCurve));
+  // A drift or a slip that fades after one kind of command, or after any.
+  for (const TargetGroup* group : {&kWorld, &kSlip}) {
+    const auto fading = make.put(*group, Basis{{which, since}});
+    for (Eigen::Index key = 0; key < keys; ++key)
+      if (before[static_cast<std::size_t>(key)] != kNoCommand)
+        make.add(*group, "previous-command", {"history", "time_since_command"}, some(fading, key * kCurve, kCurve),
+                 static_cast<double>(keys));
+    make.add(*group, "previous-command", {"history", "time_since_command"}, some(fading, 0, keys * kCurve));
+  }
   add_duration_hypotheses(make, extent, kStraightOnly);
   add_start_hypotheses(make, extent);
   add_reversal_hypotheses(make, extent);
