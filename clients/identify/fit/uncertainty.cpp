@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 
 #include "clients/identify/model/camera_scale.hpp"
 
@@ -46,6 +47,16 @@ Eigen::MatrixXd with_bias_mean(const std::vector<Unit>& units, const Eigen::Matr
   }
   out.row(n).head(n) = out.col(n).head(n).transpose();
   return out;
+}
+
+/// The standard deviation of biases as the mean of the population has it. That of the model is the most likely one of n biases, those of
+/// the prior included, about their own mean. Over its uncertainty, their mean has Student's t distribution of n - 1 degrees of freedom,
+/// whose variance is n / (n - 3) times as large.
+double bias_sd_for_mean_mm_s(const std::vector<Unit>& units, double most_likely_mm_s) {
+  std::set<std::uint32_t> robots;
+  for (const Unit& unit : units) robots.insert(unit.robot);
+  const double n = Fitter::kPriorBiases + 2 * static_cast<double>(robots.size());
+  return most_likely_mm_s * std::sqrt(n / (n - 3));
 }
 
 /// The inverse of a positive definite matrix whose rows may have very different units.
@@ -143,8 +154,9 @@ Uncertainty uncertainty_of(const Fitter& fitter, const FitState& state) {
   Eigen::MatrixXd information = by_parameter.transpose() * of_columns * by_parameter;
   add_priors(fitter, state, information, n);
   information.bottomRightCorner(parameters - n, parameters - n) += out.held.precision;
-  const double bias_precision = 1 / (model.base.bias_sd_mm_s * model.base.bias_sd_mm_s);
-  const Eigen::MatrixXd with_mean = with_bias_mean(units, information, model.base.bias_sd_mm_s);
+  const double bias_sd_mm_s = bias_sd_for_mean_mm_s(units, model.base.bias_sd_mm_s),
+               bias_precision = 1 / (bias_sd_mm_s * bias_sd_mm_s);
+  const Eigen::MatrixXd with_mean = with_bias_mean(units, information, bias_sd_mm_s);
   std::vector<Eigen::Index> given(static_cast<std::size_t>(n) + 1, parameters);
   for (Eigen::Index i = 0; i < n; ++i) given[static_cast<std::size_t>(i)] = i;
   const Eigen::MatrixXd held = inverse_of(with_mean(given, given)), all = inverse_of(with_mean);
