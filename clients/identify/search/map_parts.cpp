@@ -135,7 +135,8 @@ MapPart best_disc(const std::vector<MapPoint>& points, const Extent& e) {
       }
     }
   }
-  for (double length = side / kCentresAcross; length > side / 400; length /= 2) {
+  double length = side / kCentresAcross;
+  while (length > side / 400) {
     for (bool moved = true; moved;) {
       moved = false;
       for (int number = 0; number < 3; ++number) {
@@ -146,6 +147,7 @@ MapPart best_disc(const std::vector<MapPoint>& points, const Extent& e) {
         }
       }
     }
+    length /= 2;
   }
   return best;
 }
@@ -164,9 +166,11 @@ MapPart best_half_plane(const std::vector<MapPoint>& points, const Extent& e) {
   };
   for (int i = 0; i < kDirections; ++i) better(M_PI * i / kDirections);
   constexpr double kLast_mm = 1;
-  for (double step_rad = M_PI / kDirections / 2; step_rad * side_mm(e) > kLast_mm; step_rad /= 2) {
+  double step_rad = M_PI / kDirections / 2;
+  while (step_rad * side_mm(e) > kLast_mm) {
     const double middle_rad = best.axis.along_rad;
     if (!better(middle_rad + step_rad)) better(middle_rad - step_rad);
+    step_rad /= 2;
   }
   return best;
 }
