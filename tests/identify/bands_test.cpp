@@ -138,6 +138,14 @@ TEST(HeldNumbers, BlocksSumToTheValue) {
   EXPECT_EQ(sum(0, 0), 0);
 }
 
+/// The derivatives of the effect by the held numbers in a situation.
+Eigen::VectorXd by_numbers(const HeldNumbers& held, const Situation& s) {
+  Eigen::VectorXd columns(static_cast<Eigen::Index>(held.columns.blocks.size()));
+  for (Eigen::Index i = 0; i < columns.size(); ++i)
+    held.columns.blocks[static_cast<std::size_t>(i)].basis.evaluate(s, 0, &columns[i]);
+  return held.columns.weights.transpose() * columns;
+}
+
 TEST(HeldNumbers, ADirectionIsOne) {
   Factor f;
   f.shape = Factor::Shape::kCosines;
@@ -160,10 +168,7 @@ TEST(HeldNumbers, ADirectionIsOne) {
   turn.points = {0.3, 0.3};
   double derivative = 0;
   turn.evaluate(s, 0, &derivative);
-  Eigen::VectorXd columns(static_cast<Eigen::Index>(held.columns.blocks.size()));
-  for (Eigen::Index i = 0; i < columns.size(); ++i)
-    held.columns.blocks[static_cast<std::size_t>(i)].basis.evaluate(s, 0, &columns[i]);
-  EXPECT_NEAR((held.columns.weights.transpose() * columns)[0], derivative / Factor::kDirectionUnit_rad,
+  EXPECT_NEAR(by_numbers(held, s)[0], derivative / Factor::kDirectionUnit_rad,
               1e-3 * std::abs(derivative) / Factor::kDirectionUnit_rad);
 }
 
@@ -191,10 +196,7 @@ TEST(HeldNumbers, OfACentreAreDifferences) {
   shift.count = 1;
   std::array<double, 5> derivative;
   shift.evaluate(s, 0, derivative.data());
-  Eigen::VectorXd columns(static_cast<Eigen::Index>(held.columns.blocks.size()));
-  for (Eigen::Index i = 0; i < columns.size(); ++i)
-    held.columns.blocks[static_cast<std::size_t>(i)].basis.evaluate(s, 0, &columns[i]);
-  const Eigen::VectorXd found = held.columns.weights.transpose() * columns;
+  const Eigen::VectorXd found = by_numbers(held, s);
   for (std::size_t n = 0; n < 5; ++n)
     EXPECT_NEAR(found[static_cast<Eigen::Index>(n)], derivative[n], 1e-4 * std::abs(derivative[n])) << n;
 }
