@@ -74,7 +74,7 @@ std::string experiment_for(const std::vector<std::string>& found, const std::vec
 
 /// Whether the written model predicts the held-out data worse than the base model, beyond chance.
 bool predicts_worse(const Findings& f) {
-  return !f.found.fit.model.terms.empty() && f.bounds && f.bounds->less_by.high_mm < 0;
+  return (!f.found.fit.model.terms.empty() || f.stalls) && f.bounds && f.bounds->less_by.high_mm < 0;
 }
 
 /// The most useful thing to do next, as one sentence.
@@ -359,7 +359,7 @@ identification::Walls walls_of(const Walls& walls) {
 std::string caveats_of(const Findings& f) {
   std::vector<std::string> sentences;
   const double before_mm = f.before.errors.rmse_mm(), after_mm = f.after.errors.rmse_mm();
-  const bool has_effects = !f.found.fit.model.terms.empty();
+  const bool has_effects = !f.found.fit.model.terms.empty() || f.stalls;
   if (predicts_worse(f))
     sentences.push_back(fmt::format(
         "With effects the error on these data is larger than that of the base model ({:.2f} mm, {:.2f} mm), beyond "

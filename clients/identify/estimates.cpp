@@ -69,20 +69,20 @@ Estimate estimate_of(const StepInterval& step) {
 std::vector<Estimate> estimates_of(std::size_t term, const Uncertainty& u, const std::vector<StepInterval>& steps) {
   std::vector<Estimate> out, amplitudes;
   const Eigen::Index first = u.all.rows() - u.held.size();
+  using Kind = HeldNumber::Kind;
   for (Eigen::Index i = 0; i < u.held.size(); ++i) {
     const HeldNumber& number = u.held.numbers[static_cast<std::size_t>(i)];
     if (number.term != term || number.name.empty()) continue;
-    const bool amplitude = number.name.starts_with(kAmplitude);
     Estimate one = with_sd(number.name, number.unit, number.value, u.sd(first + i));
     if (number.is_open(u.sd(first + i))) {
       one.clear_low();
       one.clear_high();
       one.set_how("no interval: these data leave it open");
     }
-    (amplitude ? amplitudes : out).push_back(std::move(one));
+    (number.kind == Kind::kAmplitude ? amplitudes : out).push_back(std::move(one));
     const auto next = static_cast<std::size_t>(i) + 1;
-    if (number.name == "wave number y")
-      add_wave(out, u, i - 1, next < u.held.numbers.size() && u.held.numbers[next].name == "angular frequency");
+    if (number.kind == Kind::kWaveNumberY)
+      add_wave(out, u, i - 1, next < u.held.numbers.size() && u.held.numbers[next].kind == Kind::kAngularFrequency);
   }
   std::vector<StepInterval> own;
   for (const StepInterval& step : steps)

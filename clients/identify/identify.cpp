@@ -181,53 +181,60 @@ void set_noise(Findings& f, const Fitter& fitter) {
   f.found.fit.model.noise = f.noise.most_likely;
 }
 
-/// The last check; then, beside a test set, the refit to all of the training data.
-void choose(Findings& f, const Fitter& fitter, const MeasuredSet& train, const MeasuredSet& whole,
-            const Evaluation& evaluation, const ForecastTimes& reported) {
-  const Evaluation choosing(train, nullptr, Tracks::kChoosing, fitter.threads());
-  ForecastTimes fast = reported;
-  fast.rollouts = 0;
-  if (evaluation.of() != Tracks::kHeldOut && choosing.judge(f.base, fast).errors.rows > 0) {
-    ForecastTimes times = reported;
-    times.rollouts = kRolloutsToChoose;
-    choose_on_held_out(f, fitter, choosing, times);
-  } else if (evaluation.held_out() != HeldOut::kTestSet && evaluation.judge(f.base, fast).errors.rows > 0) {
-    f.check.chose_on_reported = true;
-    choose_on_held_out(f, fitter, evaluation, reported);
-  }
-  if (&whole != &train) {
-    f.base = refitted(fitter, f.base, whole);
-    f.found.fit = f.found.fit.model.terms.empty() && f.found.fit.model.base.command_lag_s == 0
-                      ? f.base
-                      : refitted(fitter, f.found.fit, whole);
-  }
-  set_noise(f, fitter);
-  if (f.found.fit.model.terms.empty() && f.found.fit.model.base.command_lag_s == 0) f.base = f.found.fit;
-}
-
-/// Stalls, and the noise beside them. Stalls beside which the tracks of the fit, `fitted`, are predicted clearly worse are not written:
-/// the mean speed includes them already.
-void add_stalls(Findings& f, const Fitter& fitter, const MeasuredSet& fitted, const ForecastTimes& times) {
-  constexpr double kClearlyWorse = 1.02;
+/// Stalls, and the noise beside them, in place of the model without. They are looked for in the tracks of the fit. They stay unless the
+/// tracks that choose are predicted worse, beyond chance. Short stalls predict no better, for the mean speed includes them: what they
+/// explain is the spread.
+void choose_stalls(Findings& f, const Fitter& fitter, const Evaluation& choosing, const ForecastTimes& times) {
   FitState with = f.found.fit;
   f.stalls = find_stalls(fitter, with);
   if (!f.stalls) return;
-  const auto error_mm = [&](const FitState& state) {
-    return errors_of(fitted, forecast(state.model, state.tracks, times, Tracks::kFit, fitter.threads())).rmse_mm();
-  };
+  const PredictionErrors without = choosing.judge(f.found.fit, times).errors,
+                         errors = choosing.judge(with, times).errors;
+  const auto bounds = bounds_of(choosing.set(), without, errors);
   // Negated, so that an error that is no number is no reason to write them.
-  if (!(error_mm(with) <= kClearlyWorse * error_mm(f.found.fit))) {
-    f.found.rejected.insert(f.found.rejected.begin(), {"stalls",
-                                                       {"episodes"},
-                                                       "wheel speed",
-                                                       f.stalls->log10_p,
-                                                       kStallThreshold_log10_p,
-                                                       "the tracks of the fit are predicted worse with it"});
-    f.stalls.reset();
+  if (bounds ? bounds->less_by.high_mm >= 0 : errors.rmse_mm() <= without.rmse_mm()) {
+    f.found.fit = std::move(with);
     return;
   }
-  f.found.fit = std::move(with);
-  set_noise(f, fitter);
+  f.found.rejected.insert(f.found.rejected.begin(), {"stalls",
+                                                     {"episodes"},
+                                                     "wheel speed",
+                                                     f.stalls->log10_p,
+                                                     kStallThreshold_log10_p,
+                                                     "held-out data are predicted worse with it, beyond chance"});
+  f.stalls.reset();
+}
+
+/// The last check, with stalls; then, beside a test set, the refit to all of the training data.
+void choose(Findings& f, const Fitter& fitter, const MeasuredSet& train, const MeasuredSet& whole,
+            const Evaluation& evaluation, const ForecastTimes& reported, bool find_effects) {
+  const Evaluation apart(train, nullptr, Tracks::kChoosing, fitter.threads());
+  ForecastTimes fast = reported, times = reported;
+  fast.rollouts = 0;
+  const auto predicts = [&](const Evaluation& on) { return on.judge(f.base, fast).errors.rows > 0; };
+  const bool has_others = evaluation.of() != Tracks::kHeldOut && predicts(apart);
+  f.check.chose_on_reported = !has_others && evaluation.held_out() != HeldOut::kTestSet && predicts(evaluation);
+  if (has_others) times.rollouts = kRolloutsToChoose;
+  if (has_others || f.check.chose_on_reported)
+    choose_on_held_out(f, fitter, has_others ? apart : evaluation, times);
+  const bool is_base = f.found.fit.model.terms.empty() && f.found.fit.model.base.command_lag_s == 0;
+  const auto finish = [&] {
+    set_noise(f, fitter);
+    if (is_base) f.base = f.found.fit;
+  };
+  finish();
+  // Where no track is left to choose, those of the fit have to.
+  const Evaluation fitted(train, nullptr, Tracks::kFit, fitter.threads());
+  if (find_effects)
+    choose_stalls(f, fitter, has_others ? apart : f.check.chose_on_reported ? evaluation : fitted, reported);
+  if (&whole != &train) {
+    f.found.fit.model.stalls.reset();
+    f.base = refitted(fitter, f.base, whole);
+    f.found.fit = is_base ? f.base : refitted(fitter, f.found.fit, whole);
+    finish();
+    if (f.stalls) f.stalls = find_stalls(fitter, f.found.fit);
+  }
+  if (f.stalls) set_noise(f, fitter);
 }
 
 /// The errors that are reported.
@@ -283,8 +290,7 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   MeasuredSet all_fitted = train;
   for (Run& run : all_fitted.runs)
     for (Track& track : run.tracks) track.held_out = track.chooses = false;
-  choose(f, fitter, train, test != nullptr ? all_fitted : train, evaluation, reported);
-  if (options.find_effects) add_stalls(f, fitter, test != nullptr ? all_fitted : train, reported);
+  choose(f, fitter, train, test != nullptr ? all_fitted : train, evaluation, reported, options.find_effects);
   begin(kErrors, "prediction errors");
   judge(f, fitter, evaluation, reported);
   begin(kUnexplained, "what is left unexplained");

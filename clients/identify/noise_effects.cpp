@@ -175,6 +175,13 @@ std::optional<NoiseEffect> accepted(const VarianceFit& fit, const NoiseForm& can
   return out;
 }
 
+/// Whether a record is white noise on the motion, not on a measurement.
+bool is_process_noise(const proto::Effect& effect) {
+  return effect.acts_on() < proto::Effect::MEASURED_OFFSET &&
+         std::any_of(effect.function().begin(), effect.function().end(),
+                     [](const proto::Function& f) { return f.has_noise(); });
+}
+
 /// Appends the scales to the record of a noise.
 void scale_record(proto::Effect& effect, const std::vector<NoiseEffect>& effects) {
   for (const NoiseEffect& one : effects) *effect.add_function() = one.scale;
@@ -221,8 +228,7 @@ void write_noise_effects(proto::Model& model, const Noise& fitted, const std::ve
   factor.set_acts_on(proto::Effect::WHEEL_GAIN);
   factor.add_function()->mutable_noise()->set_sd(rounded(std::sqrt(fitted.factor_s)));
   for (proto::Effect& effect : *model.mutable_effect())
-    if (effect.name() == "factor-noise" || effect.name() == "wheel-noise" || effect.name() == "heading-noise")
-      scale_record(effect, effects);
+    if (is_process_noise(effect)) scale_record(effect, effects);
 }
 
 identification::Effect entry_of(const NoiseEffect& found) {

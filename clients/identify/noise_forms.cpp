@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "clients/identify/model/effect_records.hpp"
+#include "core/stats/quantiles.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -58,7 +59,8 @@ NoiseForm of_robots(const Samples& samples) {
 template <class Of> std::pair<double, double> range_of(const Samples& samples, Of&& of) {
   const auto [low, high] = std::minmax_element(samples.begin(), samples.end(),
                                                [&](const auto& a, const auto& b) { return of(a) < of(b); });
-  return {of(*low), std::max(of(*high), of(*low) + 1e-9)};
+  constexpr double kLeastRange = 1e-9;  // keeps the share of the range finite for data at one point
+  return {of(*low), std::max(of(*high), of(*low) + kLeastRange)};
 }
 
 /// cos(k pi u) at the share u of a range.
@@ -66,6 +68,8 @@ double cosine(int k, double value, std::pair<double, double> range) {
   return std::cos(k * M_PI * std::clamp((value - range.first) / (range.second - range.first), 0.0, 1.0));
 }
 
+/// Largest order of the cosines: features of a quarter of a run, and of a third of the floor. A further order costs one
+/// column over time and five over the place.
 constexpr int kTimeOrder = 4, kPlaceOrder = 3;
 
 NoiseForm of_time(const Samples& samples) {
@@ -80,7 +84,7 @@ NoiseForm of_time(const Samples& samples) {
   for (std::size_t i = 0; i < samples.size(); ++i)
     out.columns.row(static_cast<Eigen::Index>(i)) = row(samples[i].time_s);
   out.scale = [row, range](const Eigen::VectorXd& coefficients, double level) {
-    constexpr int kKnots = 25;
+    constexpr int kKnots = 25;  // six per half wave of the highest order, so that the spline follows the cosines
     proto::Function f;
     f.set_of(proto::Function::TIME);
     for (int i = 0; i < kKnots; ++i) {
@@ -108,7 +112,7 @@ NoiseForm of_place(const Samples& samples) {
   for (std::size_t i = 0; i < samples.size(); ++i)
     out.columns.row(static_cast<Eigen::Index>(i)) = row(samples[i].x_mm, samples[i].y_mm);
   out.scale = [row, xs, ys](const Eigen::VectorXd& coefficients, double level) {
-    constexpr int kKnots = 13;
+    constexpr int kKnots = 13;  // along each axis, four per half wave of the highest order
     proto::Function f;
     f.set_of(proto::Function::X);
     f.set_and_of(proto::Function::Y);
@@ -147,7 +151,7 @@ struct NeighbourCurve {
                                           : -level() * std::log1p(share * std::expm1(-most / level()));
   }
   [[nodiscard]] Eigen::RowVectorXd row(double value) const {
-    constexpr int kOrder = 3;
+    constexpr int kOrder = 3;  // as over the place
     Eigen::RowVectorXd r(kOrder + 1);
     for (int k = 0; k <= kOrder; ++k) r[k] = std::cos(k * M_PI * share(value));
     return r;
@@ -156,16 +160,18 @@ struct NeighbourCurve {
 
 /// The form over one covariate of neighbours; none if the data do not cover a range of it.
 std::optional<NoiseForm> of_neighbours(const Samples& samples, const Axis& axis) {
+  // Samples beyond each end of the range: the columns do not stretch to few outlying values.
   constexpr std::size_t kFewestBeyond = 30;
+  // Largest distance, mm: without a neighbour it is far larger, and all radii end below.
+  constexpr double kFarthest_mm = 1e3;
   std::vector<double> values;
-  for (const NoiseSample& sample : samples) values.push_back(std::min(value_of(axis, sample.at, 0), 1e3));
-  std::vector<double> sorted = values;
-  std::sort(sorted.begin(), sorted.end());
-  const std::size_t ends = std::min(kFewestBeyond, sorted.size() / 2);
+  for (const NoiseSample& sample : samples) values.push_back(std::min(value_of(axis, sample.at, 0), kFarthest_mm));
+  std::vector<double> reordered = values;
+  const std::size_t ends = std::min(kFewestBeyond, values.size() / 2);
   const bool distance = axis.of == Covariate::kNearest;
-  const NeighbourCurve curve{axis, distance ? sorted[ends] : 0,
-                             distance ? reach_mm(axis) : sorted[sorted.size() - 1 - ends]};
-  constexpr double kLeastRange = 0.1;
+  const NeighbourCurve curve{axis, distance ? stats::order_statistic(reordered, ends) : 0,
+                             distance ? reach_mm(axis) : stats::upper_end(reordered, ends)};
+  constexpr double kLeastRange = 0.1;  // a tenth of a robot, or of a mm; below, the data hold no neighbours
   if (!(curve.most > curve.least + kLeastRange)) return std::nullopt;
   NoiseForm out{"noise-by-neighbours", {"neighbours"}, {}, {}, folds_by_robot(samples), {}};
   out.in_words = fmt::format("{}{} within {:.0f} mm",
@@ -177,7 +183,7 @@ std::optional<NoiseForm> of_neighbours(const Samples& samples, const Axis& axis)
   for (std::size_t i = 0; i < samples.size(); ++i)
     out.columns.row(static_cast<Eigen::Index>(i)) = curve.row(values[i]);
   out.scale = [curve](const Eigen::VectorXd& coefficients, double level) {
-    constexpr int kKnots = 13;
+    constexpr int kKnots = 13;  // four per half wave of the highest order
     proto::Function f = function_of(curve.axis);
     for (int i = 0; i < kKnots; ++i) {
       const double value = curve.at_share(static_cast<double>(i) / (kKnots - 1));

@@ -28,8 +28,8 @@ constexpr double kMostMirrored = 0.5;
 constexpr double kMostDispersion = 2;
 /// A true spell may hold a robot where others come near, for as long as it lasts.
 constexpr double kMostAtObstacles = 2;
-/// Mean time apart, number, scale and tail of durations; and the speed within, if it is not zero.
-constexpr std::uint32_t kDegrees = 3;
+/// Mean time apart; scale, tail and shape of durations; and the speed within, if it is not zero.
+constexpr std::uint32_t kDegrees = 4;
 
 /// Stalls with parameters fitted at this speed within spells, and their gain. Without enough spells: no gain.
 std::pair<Stalls, double> first_fit(const SpellScan& scan, const MotionModel& model, double speed) {
@@ -163,17 +163,20 @@ identification::Effect entry_of(const StallEffect& found) {
   parameters["mean_apart_s"] = json_value(stalls.mean_apart_s);
   parameters["scale_s"] = json_value(stalls.scale_s);
   parameters["tail"] = json_value(stalls.tail);
+  parameters["shape"] = json_value(stalls.shape);
   parameters["mean_length_s"] = json_value(stalls.mean_length_s());
   parameters["share_of_time"] = json_value(stalls.share());
   parameters["speed"] = json_value(stalls.gain);
   *out.mutable_rmse_without_mm() = json_null();
   *out.mutable_share_removed() = json_null();
+  const std::string in_scales = fmt::format("t / {:.1f} s", stalls.scale_s);
   out.set_in_words(fmt::format(
       "robots {} at random although a motor is on: {:.0f} s from one spell to the next on average, P(duration > t) "
-      "= (1 + t / "
-      "{:.1f} s)^-{:.1f}, {:.1f} s on average",
+      "= "
+      "(1 + {})^-{:.1f}, {:.1f} s on average",
       stalls.gain > 0 ? fmt::format("slip to {:.0f} % of their speed", 100 * stalls.gain) : "stand still",
-      stalls.mean_apart_s, stalls.scale_s, stalls.tail, stalls.mean_length_s()));
+      stalls.mean_apart_s, stalls.shape == 1 ? in_scales : fmt::format("({})^{:.1f}", in_scales, stalls.shape),
+      stalls.tail, stalls.mean_length_s()));
   return out;
 }
 

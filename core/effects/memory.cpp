@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/effects/episodes.hpp"
 #include "core/effects/term.hpp"
 #include "core/math/elementary.h"
 
@@ -12,10 +13,10 @@ std::uint32_t draw_of(const MemorySlot& slot) { return (slot.index * 8 + slot.fu
 
 /// Time until the next episode; at least a tick, so that no phase is skipped.
 double wait_s(const EpisodesShape& e, double uniform, double tick_s) {
-  return std::max(-e.mean_apart_s * kt_log(uniform), tick_s);
+  return std::max(episode_wait_s(e, uniform), tick_s);
 }
 double length_s(const EpisodesShape& e, double uniform, double tick_s) {
-  return std::clamp(e.scale_s * (kt_pow(uniform, -1 / e.tail) - 1), tick_s, std::max(e.longest_s, tick_s));
+  return std::clamp(episode_length_s(e, uniform), tick_s, std::max(e.longest_s, tick_s));
 }
 
 }  // namespace

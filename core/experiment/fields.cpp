@@ -129,6 +129,7 @@ constexpr FieldRule kRules[] = {
     {"Episodes.scale_s", 0, kLongest_s, "s", Lower::kExcluded},
     {"Episodes.tail", 0.1, kLargestValue, ""},
     {"Episodes.longest_s", 0, kLongest_s, "s", Lower::kExcluded},
+    {"Episodes.shape", 0.1, 100, ""},
     {"ArenaField.cell_mm", 10, kLongest_mm, "mm"},
     {"ArenaField.forget_s", 0, kLongest_s, "s"},
     {"ArenaField.corner_x_mm", -kLongest_mm, kLongest_mm, "mm"},

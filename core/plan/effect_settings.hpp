@@ -92,7 +92,7 @@ struct NoiseShape {
   double sd = 0, correlation_s = 0;
 };
 struct EpisodesShape {
-  double mean_apart_s = 0, scale_s = 0, tail = 0, longest_s = 0;
+  double mean_apart_s = 0, scale_s = 0, tail = 0, longest_s = 0, shape = 1;
 };
 
 struct FunctionSettings {

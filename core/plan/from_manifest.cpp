@@ -329,7 +329,7 @@ decltype(FunctionSettings::shape) shape_of(const proto::Function& f) {
     case proto::Function::kNoise: return NoiseShape{f.noise().sd(), f.noise().correlation_s()};
     case proto::Function::kEpisodes:
       return EpisodesShape{f.episodes().mean_apart_s(), f.episodes().scale_s(), f.episodes().tail(),
-                           f.episodes().longest_s()};
+                           f.episodes().longest_s(), f.episodes().shape()};
     case proto::Function::SHAPE_NOT_SET: break;
   }
   return ConstantShape{0};

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 namespace kilotwin::stats {
@@ -21,6 +22,16 @@ inline constexpr double kNormal95 = 1.96;
 
 /// The value that a t distributed variable exceeds with probability 1 - p.
 [[nodiscard]] double student_quantile(double p, double degrees);
+
+/// Standard deviation of the standard Gumbel distribution, exp(-exp(-x)); its mean is Euler's constant.
+inline constexpr double kGumbelSd = 1.28254983016186409554;  // pi / sqrt(6)
+
+/// The value that the maximum of many independent variables exceeds with probability 1 - p: the quantile of the Gumbel
+/// distribution with this mean and standard deviation (Gumbel 1958, fit by moments). 0 < p < 1; the unit is that of the
+/// mean.
+[[nodiscard]] inline double gumbel_quantile(double p, double mean, double standard_deviation) {
+  return mean + standard_deviation * (-std::log(-std::log(p)) - std::numbers::egamma) / kGumbelSd;
+}
 
 /// 95 % interval of a probability of which `hits` of `trials` independent trials tell (Wilson 1927). trials > 0.
 [[nodiscard]] inline std::pair<double, double> wilson_interval(double hits, double trials) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "clients/identify/fit/filter_bank.hpp"
 #include "clients/identify/fit/fitter.hpp"
 #include "clients/identify/fit/spell_scan.hpp"
 #include "clients/identify/model/model_file.hpp"
@@ -16,12 +17,22 @@ namespace {
 
 using namespace identify;
 
-TEST(Stalls, MomentsAreThoseOfTheirLaw) {
+Stalls of_shape(double shape) {
   Stalls stalls;
   stalls.mean_apart_s = 40;
   stalls.scale_s = 6;
   stalls.tail = 2.5;
+  stalls.shape = shape;
   stalls.longest_s = 200;
+  return stalls;
+}
+
+class StallsOfShape : public testing::TestWithParam<double> {};
+
+INSTANTIATE_TEST_SUITE_P(LomaxAndBurr, StallsOfShape, testing::Values(1.0, 3.0));
+
+TEST_P(StallsOfShape, MomentsAreThoseOfTheirLaw) {
+  const Stalls stalls = of_shape(GetParam());
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> uniform(1e-12, 1);
   // The mean duration, and moments of the time in spells during 10 s from a random instant on.
@@ -50,10 +61,28 @@ TEST(Stalls, MomentsAreThoseOfTheirLaw) {
   EXPECT_NEAR(variance_s, stalls.variance_s(kOver_s), 0.1 * variance_s);
 }
 
-TEST(Stalls, DurationsAreFittedWithCensoring) {
+TEST_P(StallsOfShape, ASpellThatHasLastedGoesOnAsOthersDid) {
+  const Stalls stalls = of_shape(GetParam());
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> uniform(1e-12, 1);
+  constexpr double kLasted_s = 3, kMore_s = 2;
+  constexpr int kDraws = 200000;
+  double lasted = 0, longer = 0, drawn = 0;
+  for (int i = 0; i < kDraws; ++i) {
+    const double length_s = stalls.length_s(uniform(random));
+    lasted += length_s > kLasted_s;
+    longer += length_s > kLasted_s + kMore_s;
+    drawn += stalls.rest_after_s(kLasted_s, uniform(random)) > kMore_s;
+  }
+  const double share = longer / lasted;
+  EXPECT_NEAR(drawn / kDraws, share, 4 * std::sqrt(share * (1 - share) / lasted));
+}
+
+TEST_P(StallsOfShape, DurationsAreFittedWithCensoring) {
   Stalls truth;
   truth.scale_s = 8;
   truth.tail = 3;
+  truth.shape = GetParam();
   std::mt19937_64 random(4);
   std::uniform_real_distribution<double> uniform(1e-12, 1);
   constexpr double kSeen_s = 6, kLeast_s = 0.25;
@@ -112,6 +141,52 @@ TEST(Stalls, SlipsHaveASpeed) {
   const WithStalls f(small({truth::rare_spells({30, 9, 3, 0.4})}));
   ASSERT_TRUE(f.found);
   EXPECT_NEAR(f.found->stalls.gain, 0.4, 0.1);
+}
+
+/// The probability that a robot is in a spell, by its motion up to the time.
+double in_spell(const FilterBank& bank) {
+  double in = 0, all = 0;
+  for (const FilterBank::Hypothesis& h : bank.hypotheses()) {
+    all += std::exp(h.log_weight);
+    if (h.spell && h.spell->in_spell) in += std::exp(h.log_weight);
+  }
+  return in / all;
+}
+
+TEST(Stalls, AreKnownFromThePastWhereAForecastStarts) {
+  // Brier scores where the motion shows clearly whether a robot stands: of the filter, and of the share of the time in spells.
+  truth::Scene scene = small({truth::rare_spells({30, 6, 2.5, 0})});
+  const WithStalls f(scene);
+  ASSERT_TRUE(f.found);
+  double score = 0, of_share = 0, count = 0;
+  for (const TrackView& view : f.state.tracks.views()) {
+    FilterBank bank(f.state.model, view);
+    const std::vector<Sample>& samples = view.track->samples;
+    for (std::size_t i = 4; i < samples.size(); ++i) {
+      bank.advance_to(samples[i].time_s);
+      const double moved_mm =
+                       std::hypot(samples[i].x_mm - samples[i - 4].x_mm, samples[i].y_mm - samples[i - 4].y_mm),
+                   turned_rad = std::abs(wrapped_angle(samples[i].heading_rad - samples[i - 4].heading_rad)),
+                   length_s = samples[i].time_s - samples[i - 4].time_s;
+      const CommandState command = view.clock->at(samples[i].time_s - 1e-9);
+      if (!command.driven() || command.since_s < 2 * length_s) continue;
+      // Walls and other robots hold robots, too.
+      constexpr double kClear_mm = 30;
+      const double nearest_mm = view.neighbours->view(view.place, samples[i].time_s).nearest_mm;
+      if (f.state.model.walls.at_wall(samples[i].x_mm, samples[i].y_mm, kClear_mm) || nearest_mm < 33 + kClear_mm)
+        continue;
+      // Clear cases only: it stood, or it moved.
+      const bool stood =
+          moved_mm < 1.5 && turned_rad<0.08, moves = moved_mm> 6 * length_s || turned_rad > 0.2 * length_s;
+      if (stood == moves) continue;
+      const double in = stood ? 1 : 0, share = f.found->stalls.share();
+      score += std::pow(in_spell(bank) - in, 2);
+      of_share += std::pow(share - in, 2);
+      count += 1;
+    }
+  }
+  EXPECT_GT(count, 500);
+  EXPECT_LT(score, 0.3 * of_share);
 }
 
 TEST(Stalls, AreNotFoundInNoise) {

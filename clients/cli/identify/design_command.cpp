@@ -13,6 +13,7 @@
 #include "clients/cli/progress.hpp"
 #include "clients/identify/result/result_file.hpp"
 #include "core/base/error.hpp"
+#include "core/base/pose.hpp"
 #include "core/experiment/load.hpp"
 #include "core/experiment/validate.hpp"
 #include "core/os/files.hpp"
@@ -63,8 +64,8 @@ identify::PlanArena arena_of(const DesignArguments& arguments, const identificat
   identify::PlanArena arena;
   if (arguments.arena.empty()) {
     const identification::Walls& walls = result.walls();
-    constexpr double kDisc_mm = 33;
-    // The largest arena about the origin within the walls.
+    // The largest arena about the origin within the walls, which bound the disc centres.
+    constexpr double kDisc_mm = 2 * kRobotRadius_mm;
     arena.width_mm = 2 * std::min(-walls.x_low_mm(), walls.x_high_mm()) + kDisc_mm;
     arena.height_mm = 2 * std::min(-walls.y_low_mm(), walls.y_high_mm()) + kDisc_mm;
     if (!walls.has_x_low_mm() || !walls.has_x_high_mm() || !walls.has_y_low_mm() || !walls.has_y_high_mm())

@@ -12,7 +12,6 @@ namespace kilotwin::cli {
 
 /// Fits the radio. Tables, figures and one model per robot set are in out/radio. There are no position
 /// predictions. Throws UserError on malformed files.
-/// predictions of places. Throws UserError where a file does not parse.
 [[nodiscard]] identify::Identified identify_radio_runs(const std::filesystem::path& train,
                                                        const std::filesystem::path& test,
                                                        const std::filesystem::path& out, const identify::Options&);

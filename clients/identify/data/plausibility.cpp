@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
+#include <map>
 #include <vector>
 
 #include "clients/identify/data/command_clock.hpp"
@@ -23,6 +25,8 @@ constexpr double kSlowestSampling_s = 60;
 constexpr double kFarthest_mm = 1e6;
 // Smallest plausible extent of all positions. Two discs of 33 mm need more.
 constexpr double kSmallestRoom_mm = 15;
+// Half of a disc's diameter.
+constexpr double kHalfDisc_mm = 16.5;
 // Kilobots drive at 10 mm/s. Bounds of a plausible median speed.
 constexpr double kFastestMedian_mm_s = 150, kSlowestMedian_mm_s = 0.1;
 constexpr double kLook_s = 5;
@@ -200,6 +204,79 @@ void demand_plane_axes(const MeasuredSet& set, const std::string& from) {
                     from, against, with + against));
 }
 
+/// Discs of 33 mm cannot overlap by half: positions in centimetres look so.
+void demand_room(const MeasuredSet& set, const std::string& from) {
+  constexpr double kInstant_s = 10, kFewestRobots = 12;
+  std::size_t robots = 0, overlap = 0;
+  for (const Run& run : set.runs) {
+    // The first sample of each robot in each second that begins an instant.
+    std::map<long, std::vector<const Sample*>> instants;
+    for (const Track& track : run.tracks) {
+      long last = -1;
+      for (const Sample& s : track.samples) {
+        const long instant = std::lround(std::floor(s.time_s / kInstant_s));
+        if (s.time_s - kInstant_s * static_cast<double>(instant) >= 1 || instant == last) continue;
+        instants[instant].push_back(&s);
+        last = instant;
+      }
+    }
+    for (const auto& [instant, seen] : instants) {
+      for (const Sample* const one : seen) {
+        ++robots;
+        overlap += std::any_of(seen.begin(), seen.end(), [&](const Sample* other) {
+          return other != one && std::hypot(other->x_mm - one->x_mm, other->y_mm - one->y_mm) < kHalfDisc_mm;
+        });
+      }
+    }
+  }
+  if (static_cast<double>(robots) >= kFewestRobots && 2 * overlap > robots)
+    throw UserError(
+        fmt::format("{}: {} % of the robots, 33 mm wide each, are within {:g} mm of another; give x_mm and y_mm in "
+                    "mm (not centimetres), or state the unit: --unit-mm 10",
+                    from, 100 * overlap / robots, kHalfDisc_mm));
+}
+
+/// Headings of robots that drive straight are the directions of their motion.
+void demand_headings_of_motion(const MeasuredSet& set, const std::string& from) {
+  constexpr double kLasts_s = 2, kMoved_mm = 5, kFewestDrives = 20;
+  // Mean resultant lengths, 0..1, and a turn beyond which no camera or marker is turned unwittingly.
+  constexpr double kAgree = 0.9, kDisagree = 0.5, kMuch_rad = M_PI / 3;
+  std::complex<double> behind = 0, mirrored = 0;
+  double count = 0;
+  for (const Run& run : set.runs) {
+    for (const Track& track : run.tracks) {
+      const CommandClock clock(track);
+      for (std::size_t i = 0, j = 0; i < track.samples.size(); i = j) {
+        for (j = i + 1; j < track.samples.size() && track.samples[j].time_s < track.samples[i].time_s + kLasts_s;)
+          ++j;
+        if (j >= track.samples.size()) break;
+        const Sample &a = track.samples[i], &b = track.samples[j];
+        const double dx_mm = b.x_mm - a.x_mm, dy_mm = b.y_mm - a.y_mm;
+        if (std::isnan(a.heading_rad) || clock.at(a.time_s).command != Motion::kStraight ||
+            clock.next_change_s(a.time_s) < b.time_s || std::hypot(dx_mm, dy_mm) < kMoved_mm)
+          continue;
+        const double direction = std::atan2(dy_mm, dx_mm);
+        behind += std::polar(1.0, a.heading_rad - direction);
+        mirrored += std::polar(1.0, a.heading_rad + direction);
+        count += 1;
+      }
+    }
+  }
+  if (count < kFewestDrives) return;
+  if (std::abs(behind) < kDisagree * count && std::abs(mirrored) > kAgree * count)
+    throw UserError(
+        fmt::format("{}: heading_rad turns against the motion of robots that drive straight; give headings "
+                    "anticlockwise (their "
+                    "negatives)",
+                    from));
+  if (std::abs(behind) > kAgree * count && std::abs(std::arg(behind)) > kMuch_rad)
+    throw UserError(
+        fmt::format("{}: heading_rad points {:.0f} degrees to the {} of the motion of robots that drive straight; "
+                    "give the heading "
+                    "of the front, 0 along x",
+                    from, std::abs(std::arg(behind)) * 180 / M_PI, std::arg(behind) > 0 ? "left" : "right"));
+}
+
 }  // namespace
 
 void demand_plausible(const MeasuredSet& set, const std::string& from) {
@@ -210,6 +287,8 @@ void demand_plausible(const MeasuredSet& set, const std::string& from) {
   demand_radians(set, from);
   demand_motion(set, from);
   demand_plane_axes(set, from);
+  demand_room(set, from);
+  demand_headings_of_motion(set, from);
 }
 
 void demand_longer_than(const MeasuredSet& set, double horizon_s, bool held_out_only, const std::string& from) {

@@ -10,8 +10,9 @@ namespace kilotwin::identify {
 
 /// Throws UserError, with the remedy, if
 ///   - times are not seconds since the start of the run (an epoch, milliseconds, frames), or a run is many recordings;
-///   - positions are not mm (metres, pixels), or headings not radians;
+///   - positions are not mm (metres, centimetres, pixels), or headings not radians;
 ///   - nearly all turns go against the commands: y points down;
+///   - headings of robots that drive straight are clockwise, or turned by more than 60 degrees from their motion;
 ///   - no robot is commanded to move while it is tracked, or no commanded robot moves.
 /// `from` is the directory, for the message.
 void demand_plausible(const MeasuredSet&, const std::string& from);

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/base/error.hpp"
+#include "core/base/pose.hpp"
 #include "core/csv/csv_reader.hpp"
 #include "core/csv/csv_writer.hpp"
 #include "core/os/files.hpp"
@@ -22,7 +23,6 @@ namespace kilotwin::identify {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kDiscRadius_mm = 16.5;
 constexpr std::string_view kColumnsExample = "time=t,robot=ID,x=px,y=py,heading=theta";
 
 std::string run_of_file(const fs::path& file) {
@@ -171,7 +171,7 @@ std::string rows_of_track_table(const fs::path& file) {
       low_x = std::min(low_x, row.x), high_x = std::max(high_x, row.x);
       low_y = std::min(low_y, row.y), high_y = std::max(high_y, row.y);
     }
-    unit_mm = kDiscRadius_mm / stats::upper_median(radii);
+    unit_mm = kRobotRadius_mm / stats::upper_median(radii);
     x_middle = (low_x + high_x) / 2;
     y_middle = (low_y + high_y) / 2;
     up = -1;  // y of a picture points down

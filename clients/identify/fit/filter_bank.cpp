@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "clients/identify/fit/contact_gate.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -24,22 +26,73 @@ void FilterBank::advance_to(double to_s) {
 
 void FilterBank::take(const Sample& sample) {
   if (next_ == 0) return start(sample);
-  const double from_s = last_s(), weight = total_of(hypotheses_);
-  double lost = 0;
-  for (Hypothesis& h : hypotheses_) {
-    sub_steps(*view_.clock, from_s, sample.time_s, [&](double t, double length, const CommandState& commands) {
-      h.filter.step(t, length, commands, view_.neighbours->view(view_.place, std::min(t, from_s)));
-    });
-    const Innovation innovation = h.filter.update(sample, view_.clock->at(sample.time_s - 1e-9));
-    h.log_weight += innovation.log_likelihood;
-    if (!innovation.lost || innovation.size != 2) continue;
-    h.log_weight -= 20;
-    lost += 1;
-  }
+  // Beside many headings nobody can tell a spell.
+  constexpr std::size_t kFewHeadings = 2;
+  const double weight = total_of(hypotheses_);
+  if (model_.stalls && (hypotheses_.front().spell || hypotheses_.size() <= kFewHeadings))
+    hypotheses_ = with_spells(sample);
+  else
+    for (Hypothesis& h : hypotheses_) carry(h, sample);
   log_likelihood_ += total_of(hypotheses_) - weight;
   // Every hypothesis lost the track: the position is known, the heading may be another one.
-  if (lost > 0 && lost == static_cast<double>(hypotheses_.size())) return restart(sample);
+  if (std::all_of(hypotheses_.begin(), hypotheses_.end(), [](const Hypothesis& h) { return h.lost; }))
+    return restart(sample);
   prune();
+}
+
+bool FilterBank::carry(Hypothesis& h, const Sample& sample) const {
+  constexpr double kLost = 20;
+  const double from_s = last_s();
+  ContactGate gate;
+  bool driven = false;
+  sub_steps(*view_.clock, from_s, sample.time_s, [&](double t, double length, const CommandState& commands) {
+    gate.step(h.filter.step(t, length, commands, view_.neighbours->view(view_.place, std::min(t, from_s))));
+    driven = driven || commands.driven();
+  });
+  const Innovation innovation = h.filter.update(sample, view_.clock->at(sample.time_s - 1e-9));
+  h.distance2 = innovation.distance2;
+  h.lost = innovation.lost && innovation.size == 2;
+  h.log_weight += innovation.log_likelihood;
+  if (h.lost) h.log_weight -= kLost;
+  return driven && gate.update(innovation) == ContactGate::Counts::kAll;
+}
+
+std::vector<FilterBank::Hypothesis> FilterBank::with_spells(const Sample& sample) const {
+  const Stalls& stalls = *model_.stalls;
+  const double length_s = sample.time_s - last_s(), share = std::clamp(stalls.share(), 1e-6, 0.5);
+  std::vector<Hypothesis> before, after;
+  for (const Hypothesis& h : hypotheses_) {
+    before.push_back(h);
+    if (h.spell) continue;
+    before.back().spell = SpellState{};
+    before.back().log_weight += std::log(1 - share);
+    before.push_back(h);
+    before.back().spell = SpellState{true, 0, 0};
+    before.back().log_weight += std::log(share);
+  }
+  const auto add = [&](Hypothesis h, const SpellBranch& branch) {
+    h.spell = branch.after;
+    h.log_weight += branch.log_probability;
+    after.push_back(std::move(h));
+  };
+  const auto carried = [&](Hypothesis h, const SpellBranch& branch, bool& shown) {
+    h.filter.in_spell(branch.share, branch.variance_s, false);
+    shown = carry(h, sample);
+    return h;
+  };
+  for (const Hypothesis& h : before) {
+    bool shown = false;
+    const SpellBranch stays = spell_stays(stalls, *h.spell, length_s);
+    const Hypothesis same = carried(h, stays, shown);
+    if (!shown) {
+      add(same, spell_changes_unseen(stalls, *h.spell, length_s));
+    } else if (before.size() > 1 || h.spell->in_spell || same.distance2 > kBenignForSpells) {
+      for (const SpellBranch& change : spell_changes(stalls, *h.spell, length_s))
+        add(carried(h, change, shown), change);
+    }
+    add(same, stays);
+  }
+  return after;
 }
 
 void FilterBank::start(const Sample& sample) {
@@ -49,7 +102,7 @@ void FilterBank::start(const Sample& sample) {
     TrackFilter filter(model_, bias, view_.track->robot, view_.number);
     filter.start(sample, {}, heading, sd);
     filter.stay_within_walls();
-    hypotheses_.push_back({std::move(filter), 0});
+    hypotheses_.push_back({std::move(filter)});
   };
   if (TrackFilter::has_heading(sample)) return add(sample.heading_rad, std::sqrt(model_.noise.heading_rad2));
   constexpr int kHeadings = 18;
@@ -93,15 +146,29 @@ void FilterBank::prune() {
   for (Hypothesis& h : hypotheses_) h.log_weight = any ? h.log_weight - best : 0;
   std::erase_if(hypotheses_,
                 [](const Hypothesis& h) { return !std::isfinite(h.log_weight) || h.log_weight < -kHopeless; });
-  // Merges hypotheses that have converged to the same heading.
+  merge();
+  constexpr std::size_t kMostHistories = 6;
+  if (!hypotheses_.front().spell || hypotheses_.size() <= kMostHistories) return;
+  std::stable_sort(hypotheses_.begin(), hypotheses_.end(),
+                   [](const Hypothesis& a, const Hypothesis& b) { return a.log_weight > b.log_weight; });
+  hypotheses_.erase(hypotheses_.begin() + kMostHistories, hypotheses_.end());
+}
+
+/// Merges hypotheses that have converged to the same heading, with spells that were the same of late.
+void FilterBank::merge() {
   for (std::size_t i = 0; i + 1 < hypotheses_.size(); ++i) {
     for (std::size_t j = i + 1; j < hypotheses_.size();) {
       const Belief& a = hypotheses_[i].filter.belief();
       const Belief& b = hypotheses_[j].filter.belief();
+      const std::optional<SpellState>&of_a = hypotheses_[i].spell, &of_b = hypotheses_[j].spell;
       const double apart = wrapped_angle(a.mean[2] - b.mean[2]);
-      if (apart * apart < 0.25 * std::min(a.covariance(2, 2), b.covariance(2, 2))) {
+      const bool alike = !of_a || !of_b || of_a->like(*of_b);
+      if (alike && apart * apart < 0.25 * std::min(a.covariance(2, 2), b.covariance(2, 2))) {
         const double wa = std::exp(hypotheses_[i].log_weight), wb = std::exp(hypotheses_[j].log_weight);
-        if (wb > wa) hypotheses_[i].filter = hypotheses_[j].filter;
+        if (wb > wa) {
+          hypotheses_[i].filter = hypotheses_[j].filter;
+          hypotheses_[i].spell = hypotheses_[j].spell;
+        }
         hypotheses_[i].log_weight = std::log(wa + wb);
         hypotheses_.erase(hypotheses_.begin() + static_cast<std::ptrdiff_t>(j));
       } else {

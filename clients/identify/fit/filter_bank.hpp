@@ -1,11 +1,13 @@
 /// Causal state estimate of one robot: a bank of extended Kalman filters (a Gaussian sum), one per hypothesis of
 /// the initial heading. Without measured headings, 18 evenly spaced hypotheses start and are pruned and merged. They start
-/// again where all have lost the track.
+/// again where all have lost the track. Once few headings are left, hypotheses of a model with stalls are histories of spells, too.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "clients/identify/fit/filter_pass.hpp"
+#include "clients/identify/fit/spell_branches.hpp"
 
 namespace kilotwin::identify {
 
@@ -23,6 +25,9 @@ class FilterBank {
   struct Hypothesis {
     TrackFilter filter;
     double log_weight = 0;
+    std::optional<SpellState> spell = std::nullopt;  ///< none: at random
+    double distance2 = 0;                            ///< squared Mahalanobis distance of the last sample
+    bool lost = false;                               ///< whether it lost the track there
   };
   [[nodiscard]] const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
   [[nodiscard]] const TrackView& view() const { return view_; }
@@ -31,10 +36,15 @@ class FilterBank {
 
  private:
   void take(const Sample&);
+  /// Carries a hypothesis to a sample. Returns whether its motion shows spells.
+  bool carry(Hypothesis&, const Sample&) const;
+  /// Hypotheses of what spells may do up to the sample.
+  [[nodiscard]] std::vector<Hypothesis> with_spells(const Sample&) const;
   void start(const Sample&);
   /// Starts anew where the track was lost, at any heading, most likely near the present ones.
   void restart(const Sample&);
   void prune();
+  void merge();
 
   const MotionModel& model_;
   const TrackView& view_;

@@ -62,6 +62,8 @@ Eigen::VectorXd scale_of(const Factor& f) {
 
 /// Prior precisions of a known factor's coefficients: their own spread, smaller for rougher columns, and the scale held.
 Eigen::MatrixXd prior_of(const Factor& f) {
+  // kHeld: standard deviation of the scale, relative. A larger one would count the uncertainty of the open function
+  // twice. kLeast: variance of a function that is 0 everywhere, which keeps the precision finite.
   constexpr double kHeld = 1e-3, kLeast = 1e-6;
   Factor open = f;
   open.known.clear();
@@ -85,6 +87,7 @@ struct MovableNumber {
   double value, step;
   std::function<bool(const Factor&)> is_in;
   std::function<void(Factor&, double)> move;
+  HeldNumber::Kind kind = HeldNumber::Kind::kOther;
 };
 
 void add_centre(std::vector<MovableNumber>& to, const Factor& f, const DataExtent& extent) {
@@ -96,6 +99,7 @@ void add_centre(std::vector<MovableNumber>& to, const Factor& f, const DataExten
                   },
                   [number](Factor& moved, double by) { moved.axis.point.*number += by; }});
   };
+  // Far below the widths of curves, and far above rounding. Velocity and growth move the circle by as much in a run.
   constexpr double kStep_mm = 1;
   add("centre x", "mm", &MovingPoint::x_mm, kStep_mm);
   add("centre y", "mm", &MovingPoint::y_mm, kStep_mm);
@@ -109,7 +113,7 @@ void add_centre(std::vector<MovableNumber>& to, const Factor& f, const DataExten
 
 void add_direction(std::vector<MovableNumber>& to, const Factor& f, const DataExtent& extent) {
   const double along_rad = f.axis.along_rad;
-  constexpr double kStep_mm = 1;
+  constexpr double kStep_mm = 1;  // at the border of the data, as for a centre
   to.push_back({"direction", "rad", along_rad, kStep_mm / extent.half_side_mm,
                 [along_rad](const Factor& other) {
                   return other.axis.of == Covariate::kAlong && other.axis.along_rad == along_rad;
@@ -119,11 +123,15 @@ void add_direction(std::vector<MovableNumber>& to, const Factor& f, const DataEx
 
 void add_wave(std::vector<MovableNumber>& to, const Factor& f, const DataExtent& extent) {
   const std::vector<double> points = f.points;
+  // Change of the phase at the border of the data, or in a run. The error of the derivative is its square over 6, some
+  // 0.01 %.
   constexpr double kStep_rad = 0.02;
+  using Kind = HeldNumber::Kind;
+  const double step_mm = kStep_rad / extent.half_side_mm, step_s = kStep_rad / extent.duration_s;
   const std::array<MovableNumber, 3> all = {
-      {{"wave number x", "rad/mm", points[0], kStep_rad / extent.half_side_mm, {}, {}},
-       {"wave number y", "rad/mm", points[1], kStep_rad / extent.half_side_mm, {}, {}},
-       {"angular frequency", "rad/s", points[2], kStep_rad / extent.duration_s, {}, {}}}};
+      {{"wave number x", "rad/mm", points[0], step_mm, {}, {}, Kind::kWaveNumberX},
+       {"wave number y", "rad/mm", points[1], step_mm, {}, {}, Kind::kWaveNumberY},
+       {"angular frequency", "rad/s", points[2], step_s, {}, {}, Kind::kAngularFrequency}}};
   for (std::size_t d = 0; d < all.size(); ++d) {
     if (d == 2 && points[d] == 0) continue;  // a pattern that stands still
     MovableNumber& number = to.emplace_back(all[d]);
@@ -135,7 +143,7 @@ void add_wave(std::vector<MovableNumber>& to, const Factor& f, const DataExtent&
 }
 
 void add_scale(std::vector<MovableNumber>& to, const Factor& f, const char* name) {
-  constexpr double kShare = 0.01;
+  constexpr double kShare = 0.01;  // of the number; an error of the derivative of some 0.01 %
   const double value = f.points[0];
   to.push_back({name, unit_of(f.axis.of), value, kShare * std::abs(value),
                 [shape = f.shape, axis = f.axis, value](const Factor& other) {
@@ -211,7 +219,7 @@ class Collector {
 
  private:
   void add_function(std::size_t t, const Factor& f) {
-    constexpr double kLeast = 1e-6;
+    constexpr double kLeast = 1e-6;  // variance of a flat map, which keeps the precision finite
     Eigen::MatrixXd prior;
     if (is_map_of_nodes(f)) {
       constexpr auto n = Eigen::Index{kDeviationNodes} * kDeviationNodes;
@@ -228,8 +236,9 @@ class Collector {
       if (f.shape != Shape::kTable) continue;
       const auto key = static_cast<std::size_t>(i);
       number.name =
-          std::string(kAmplitude) + name_of(f.axis.of) + " " + std::to_string(static_cast<int>(f.points[key]));
+          std::string("amplitude, ") + name_of(f.axis.of) + " " + std::to_string(static_cast<int>(f.points[key]));
       number.value = f.plus + f.known[key];
+      number.kind = HeldNumber::Kind::kAmplitude;
     }
   }
   void add_nodes(const OwnBlock& one, std::size_t f, Eigen::Index first) {
@@ -257,9 +266,11 @@ class Collector {
           to_.columns.add(std::move(part.block), one.index, at, part.weight * sign / (2 * number.step));
       }
     }
-    constexpr double kFarthest = 1e4;  // steps
+    // Steps: 10 m, 200 rad of phase or 100 times a decay time, beyond all that data tell. Closer, the prior would
+    // narrow intervals.
+    constexpr double kFarthest = 1e4;
     const double farthest = kFarthest * number.step;
-    to_.numbers.push_back({t, number.name, number.unit, number.value, farthest});
+    to_.numbers.push_back({t, number.name, number.unit, number.value, farthest, number.kind});
     priors_.emplace_back(at, Eigen::MatrixXd::Constant(1, 1, 1 / (farthest * farthest)));
   }
 
@@ -286,6 +297,7 @@ void ColumnSums::finish(Eigen::Index sums) {
 }
 
 std::vector<WeighedBlock> value_as_blocks(const Block& block, const Eigen::VectorXd& coefficients, int open) {
+  // Products with more parts get no columns: each part is a block of the linearisation, which this bounds.
   constexpr Eigen::Index kMostBlocks = 64;
   const std::vector<Factor>& factors = block.basis.factors;
   const Eigen::VectorXd all = of_all_products(block.basis, coefficients);

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -30,16 +31,15 @@ struct ColumnSums {
   std::vector<Part> parts_;  ///< by block
 };
 
-/// Start of the name of an amplitude: "amplitude, robot 3".
-inline constexpr const char* kAmplitude = "amplitude, ";
-
 struct HeldNumber {
+  enum class Kind : std::uint8_t { kOther, kAmplitude, kWaveNumberX, kWaveNumberY, kAngularFrequency };
   std::size_t term = 0;
   std::string name;  ///< of numbers that are reported; empty: a coefficient or a node
   std::string unit = {};
   double value = 0;
   double farthest =
       0;  ///< standard deviation of its prior, which only keeps the variance finite; 0: the prior has a meaning
+  Kind kind = Kind::kOther;
 
   /// Whether the data leave it open: its standard deviation is that of the prior.
   [[nodiscard]] bool is_open(double sd) const { return farthest > 0 && sd > farthest / 2; }

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "clients/identify/fit/linearisation.hpp"
+#include "clients/identify/fit/noise_samples.hpp"
 #include "clients/identify/fit/profile.hpp"
 #include "core/os/worker_pool.hpp"
 #include "core/stats/distributions.hpp"
@@ -24,7 +25,8 @@ constexpr std::size_t kSpreading = kPosition;  ///< number of process noises
 using NoiseVector = FittedVariances;           ///< of their logarithms, where nothing else is said
 using PoseByBias = Eigen::Matrix<double, 3, 2>;
 
-/// A lower variance has no influence; a higher one hides everything.
+/// A lower variance has no influence; a higher one hides everything. Units as in Noise, in the order of the fitted
+/// variances.
 constexpr std::array<double, kCount> kLeast = {1e-6, 1e-4, 1e-8, 1e-6, 1e-4, 1e-6},
                                      kMost = {1, 100, 1, 100, 1e4, 10};
 
@@ -174,8 +176,11 @@ double log_likelihood(const Path& path, const NoiseVector& variance, BiasSums* b
     Eigen::Matrix3d inverse = seen.inverse();
     const double distance2 = difference.dot(inverse * difference);
     const double factor = outlier_factor(distance2, s.size);
-    const double value =
-        std::max(-1e3, -0.5 * (std::log(seen.determinant()) + s.size * std::log(factor) + distance2 / factor));
+    // Bound on one sample, so that none decides alone. It is also the value of a covariance that is not positive
+    // definite.
+    constexpr double kLeastValue = -1e3;
+    const double value = std::max(
+        kLeastValue, -0.5 * (std::log(seen.determinant()) + s.size * std::log(factor) + distance2 / factor));
     sum += value;
     each(s.time_s, value);
     inverse /= factor;
@@ -201,17 +206,17 @@ double log_likelihood(const Path& path, const NoiseVector& variance, BiasSums* b
 
 /// Log likelihood by stretches of a path that hardly depend on each other.
 std::vector<double> by_stretches(const Path& path, const NoiseVector& variance) {
-  constexpr double kStretch_s = 20;
   std::map<double, double> sums;
   log_likelihood(path, variance, nullptr,
-                 [&](double time_s, double value) { sums[std::floor(time_s / kStretch_s)] += value; });
+                 [&](double time_s, double value) { sums[std::floor(time_s / kNoiseStretch_s)] += value; });
   std::vector<double> out;
   out.reserve(sums.size());
   for (const auto& [stretch, sum] : sums) out.push_back(sum);
   return out;
 }
 
-/// Weak prior about the start: bounds the search where the data say nothing.
+/// Weak prior about the default noise: bounds the search where the data say nothing. Its standard deviation of 6 is a
+/// factor of 400 of a variance. A narrower one would pull what the data tell.
 double log_prior(const NoiseVector& logs) {
   constexpr double kWeak = 1.0 / (6 * 6);
   static const NoiseVector middle = logs_of(Noise{});
@@ -260,7 +265,7 @@ class Climb {
   struct Search {
     Eigen::Index fixed = -1;
     int most_steps = 20;
-    double settled = 0.3;
+    double settled = 0.3;  ///< nat; a search from near, or a further round, gains the rest
     Square inverse = Square::Zero();
   };
   [[nodiscard]] Search from_afar() const {
@@ -271,8 +276,11 @@ class Climb {
   }
   /// With the negative second derivatives `curvature` near the maximum.
   [[nodiscard]] Search from_near(const Eigen::MatrixXd& curvature, Eigen::Index fixed) const {
+    // kFlattest: least curvature of a direction, at which a log variance has the standard deviation 1.4. Flatter ones
+    // would take far steps. kSettled: 1 % of the drop at the end of a 95 % interval. A larger one shifts these ends.
     constexpr double kFlattest = 0.5, kSettled = 0.02;
-    Search search{fixed, 8, kSettled, Square::Zero()};
+    constexpr int kMostSteps = 8;  // bounds the cost: each end of a profile takes several searches
+    Search search{fixed, kMostSteps, kSettled, Square::Zero()};
     Eigen::MatrixXd others = curvature;
     if (fixed >= 0) {
       others.row(fixed).setZero();
@@ -287,16 +295,24 @@ class Climb {
 
   /// Moves to the maximum by quasi-Newton steps (BFGS), and returns the value there.
   double operator()(NoiseVector& at, Search search) const {
+    // A step changes no variance by more than a factor exp(1.5) = 4.5: the quadratic form hardly holds farther.
+    constexpr double kLongest = 1.5;
+    // A step that gains nothing is shortened, down to 0.2 % of its length. The number of trials bounds the cost of the
+    // last step.
+    constexpr int kMostShortened = 6;
+    constexpr double kShorter = 0.3;
+    // Least curvature along a step that updates the inverse: below, rounding errors of the gradients decide.
+    constexpr double kLeastAlong = 1e-9;
     double value = values({at}).front();
     NoiseVector gradient = gradient_at(at, value, search.fixed);
     for (int step = 0; step < search.most_steps; ++step) {
       NoiseVector move = search.inverse * gradient;
       if (search.fixed >= 0) move[search.fixed] = 0;
       const double longest = move.cwiseAbs().maxCoeff();
-      if (longest > 1.5) move *= 1.5 / longest;
+      if (longest > kLongest) move *= kLongest / longest;
       bool better = false;
       double gained = 0;
-      for (int halve = 0; halve < 6; ++halve, move *= 0.3) {
+      for (int shortened = 0; shortened < kMostShortened; ++shortened, move *= kShorter) {
         const double found = values({at + move}).front();
         if (!(found > value)) continue;
         gained = found - value;
@@ -310,7 +326,7 @@ class Climb {
       const NoiseVector next = gradient_at(at, value, search.fixed);
       const NoiseVector change = gradient - next;  // of the negative objective
       const double along = change.dot(move);
-      if (along > 1e-9) {
+      if (along > kLeastAlong) {
         const Square side = Square::Identity() - move * change.transpose() / along;
         search.inverse = (side * search.inverse * side.transpose() + move * move.transpose() / along).eval();
       }
@@ -323,6 +339,7 @@ class Climb {
 
   /// Negative second derivatives at the maximum.
   [[nodiscard]] Eigen::MatrixXd curvature(const NoiseVector& at) const {
+    // In logarithms. Smaller steps suffer from cancellation, larger ones from the third derivative.
     constexpr double kStep = 0.15;
     const Eigen::Index count = size();
     std::vector<NoiseVector> trials{at};
@@ -348,7 +365,8 @@ class Climb {
   /// By which factor the drop at the ends of an interval exceeds that of a perfect model and of many data. The scores of stretches
   /// along a direction may vary more than the curvature expects (Kent 1982), and few stretches tell little.
   [[nodiscard]] double widening(const NoiseVector& at, const NoiseVector& along) const {
-    constexpr double kStep = 0.05;
+    constexpr double kStep = 0.05;  // in logarithms, along the ridge
+    // Fewest stretches whose dispersion counts. Fewer widen the drop by Student's factor for eight, 1.46.
     constexpr double kFewest = 8;
     const NoiseVector up = variances(at + kStep * along), down = variances(at - kStep * along);
     stats::Moments scores;
@@ -373,7 +391,10 @@ class Climb {
     const double farthest =
         std::max(0.0, ridge[i] > 0 ? std::log(kMost[k]) - best[i] : best[i] - std::log(kLeast[k]));
     const double along = std::abs(curvature.row(i).dot(ridge.head(size())));
-    const double first = std::clamp(std::sqrt(2 * most_drop / std::max(along, 1e-3)), 0.02, 3.0);
+    // Bounds of the first distance, in the logarithm: 2 % of a variance to a factor of 20. They bound the cost, not the
+    // result.
+    constexpr double kFlattest = 1e-3, kNearest = 0.02, kFarthest = 3;
+    const double first = std::clamp(std::sqrt(2 * most_drop / std::max(along, kFlattest)), kNearest, kFarthest);
     const Search others = from_near(curvature, i);
     // The others start from the nearest point that is known.
     std::map<double, NoiseVector> known{{0, best}};
@@ -436,7 +457,7 @@ class Climb {
     return sum;
   }
   [[nodiscard]] NoiseVector gradient_at(const NoiseVector& at, double value, Eigen::Index fixed) const {
-    constexpr double kStep = 1e-3;
+    constexpr double kStep = 1e-3;  // in logarithms; the error of the slope is this times half the curvature
     std::vector<NoiseVector> trials;
     for (Eigen::Index i = 0; i < size(); ++i) {
       if (i == fixed) continue;
@@ -467,6 +488,8 @@ std::vector<Path> paths_of(const MotionModel& model, const std::vector<const Tra
 
 /// By which the other log variances follow one of them along the ridge of the likelihood.
 NoiseVector along_ridge(const Eigen::MatrixXd& curvature, Eigen::Index i) {
+  // kRidge keeps directions without information from moving. kSteepest bounds how far another variance follows, in its
+  // logarithm.
   constexpr double kRidge = 0.05, kSteepest = 3;
   Eigen::MatrixXd others = curvature;
   others.diagonal().array() += kRidge;
@@ -526,7 +549,7 @@ NoiseInterval noise_interval(const MotionModel& model, const std::vector<const T
 Noise most_likely_noise(const MotionModel& start, const std::vector<const TrackView*>& tracks, bool has_headings,
                         std::uint32_t threads) {
   MotionModel model = start;
-  constexpr int kMostRounds = 4;
+  constexpr int kMostRounds = 4;    // bounds the cost, as each round runs all filters
   constexpr double kSettled = 0.1;  // in the logarithm; the paths are then consistent with the variances
   for (int round = 0; round < kMostRounds; ++round) {
     const std::vector<Path> paths = paths_of(model, tracks, threads);
@@ -535,13 +558,16 @@ Noise most_likely_noise(const MotionModel& start, const std::vector<const TrackV
     NoiseVector at = before;
     const double value = climb(at, climb.from_afar());
     // A variance near zero has no gradient. A restart at a larger value tests whether it should be larger.
+    // kNone_mm2: a position noise of 0.1 mm, below usual trackers. kNone_s: a wheel noise of 0.3 % of the speed in 1 s.
     constexpr double kNone_mm2 = 0.01, kNone_s = 1e-5;
+    // Bounds of the restart: a drift of 0.1 mm in a second, and a position noise of 0.3 mm, whose gradient is not flat.
+    constexpr double kMostDrift_mm2_s = 1e-2, kLeastPosition_mm2 = 0.1;
     if (std::exp(at[kPosition]) < kNone_mm2 || std::exp(at[kFactor]) < kNone_s) {
       const NoiseVector middle = logs_of(Noise{});
       NoiseVector restart = at;
       restart[kFactor] = std::max(at[kFactor], middle[kFactor]);
-      restart[kDrift] = std::min(at[kDrift], std::log(1e-2));
-      restart[kPosition] = std::max(at[kPosition], std::log(0.1));
+      restart[kDrift] = std::min(at[kDrift], std::log(kMostDrift_mm2_s));
+      restart[kPosition] = std::max(at[kPosition], std::log(kLeastPosition_mm2));
       if (climb(restart, climb.from_afar()) > value) at = restart;
     }
     model.noise = with_fitted(model.noise, variances(at));

@@ -73,7 +73,7 @@ double within(const std::vector<TrackBias>& tracks) {
 }  // namespace
 
 Numbering numbering_of(const Fitter& fitter, const FitState& base) {
-  constexpr int kTrials = 400;
+  constexpr std::size_t kTrials = 400;
   std::vector<TrackBias> tracks = track_biases(fitter, base);
   std::map<std::uint32_t, std::vector<std::size_t>> runs;
   for (std::size_t t = 0; t < tracks.size(); ++t) runs[tracks[t].run].push_back(t);
@@ -89,8 +89,8 @@ Numbering numbering_of(const Fitter& fitter, const FitState& base) {
   out.spread = all.spread() / (2.0 * (all.count - 1));
   const double own = within(tracks);
   std::mt19937_64 engine(20191);
-  int as_good = 0;
-  for (int trial = 0; trial < kTrials; ++trial) {
+  std::size_t as_good = 0;
+  for (std::size_t trial = 0; trial < kTrials; ++trial) {
     std::vector<TrackBias> drawn = tracks;
     for (const auto& entry : runs) {
       const std::vector<std::size_t>& members = entry.second;
@@ -98,9 +98,9 @@ Numbering numbering_of(const Fitter& fitter, const FitState& base) {
           members.size(), [&](std::size_t n) { return engine() % n; },
           [&](std::size_t i, std::size_t j) { std::swap(drawn[members[i]].robot, drawn[members[j]].robot); });
     }
-    as_good += within(drawn) <= own ? 1 : 0;
+    as_good += within(drawn) <= own ? 1u : 0u;
   }
-  out.chance = static_cast<double>(as_good) / kTrials;
+  out.chance = stats::permutation_p(as_good, kTrials);
   return out;
 }
 

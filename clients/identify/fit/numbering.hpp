@@ -8,7 +8,8 @@ namespace kilotwin::identify {
 struct Numbering {
   /// Spread of the biases of single tracks, as a variance over that of their errors; 0: too few tracks to tell.
   double spread = 0;
-  /// Share of random numberings under which the biases of each number agree at least as well over the runs.
+  /// p value of a permutation test: under so many random numberings the biases of each number agree at least as well
+  /// over the runs. 0: too few tracks to tell.
   double chance = 0;
   /// The robots differ, but numbers tell no more than random ones.
   [[nodiscard]] bool anew() const {

@@ -6,11 +6,13 @@
 
 namespace kilotwin::identify {
 
-/// By which the profile log likelihood falls at the ends of a 95 % interval: half the quantile of chi-squared with one degree.
+/// By which the profile log likelihood falls at the ends of a 95 % interval: half the quantile of chi-squared with one
+/// degree, 3.841 / 2 = 1.96^2 / 2.
 inline constexpr double kProfileDrop95 = 1.92;
 
 /// The same where another parameter may be at its bound: an upper bound of the statistic's distribution is then the mixture of
-/// chi-squared with one and with two degrees in equal shares (Self and Liang 1987).
+/// chi-squared with one and with two degrees in equal shares (Self and Liang 1987). The drop d solves
+/// P(chi-squared_1 > 2 d) + exp(-d) = 0.1.
 inline constexpr double kProfileDropAtBound95 = 2.57;
 
 /// The distance from the maximum at which a log likelihood has fallen by `most`. `drop(distance)`: by which it has fallen;

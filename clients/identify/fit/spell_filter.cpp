@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "clients/identify/fit/likelihood.hpp"
+#include "clients/identify/fit/spell_branches.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -12,10 +13,6 @@ namespace {
 constexpr std::size_t kMostHypotheses = 6;
 /// A hypothesis this much less likely than the best is dropped, nat.
 constexpr double kMostBelow = 12;
-/// A single hypothesis without a spell is not divided at a squared Mahalanobis distance below this one.
-constexpr double kBenign = 6;
-/// A start or an end lies in one of three parts of an interval.
-constexpr int kParts = 3;
 
 /// One interval of a history.
 struct Node {
@@ -28,9 +25,7 @@ struct History {
   TrackFilter filter;
   double log_weight = 0;
   std::ptrdiff_t node = -1;
-  bool in_spell = false;
-  double lasted_s = 0;       ///< of the present spell
-  std::uint32_t recent = 0;  ///< what happened in the latest intervals, two bits each
+  SpellState spell;
 };
 
 double log_sum(double a, double b) { return std::max(a, b) + std::log1p(std::exp(-std::abs(a - b))); }
@@ -44,8 +39,8 @@ class SpellFilter {
     TrackFilter filter(model, bias, view.track->robot, view.number);
     filter.start(samples_.front(), {}, view.start_heading_rad, view.start_heading_sd_rad);
     const double share = std::clamp(stalls_.share(), 1e-6, 0.5);
-    histories_.push_back({filter, std::log(1 - share), -1, false, 0, 0});
-    histories_.push_back({filter, std::log(share), -1, true, 0, 0});
+    histories_.push_back({filter, std::log(1 - share), -1, {}});
+    histories_.push_back({filter, std::log(share), -1, {true, 0, 0}});
   }
 
   TrackSpells run() {
@@ -55,12 +50,12 @@ class SpellFilter {
   }
 
  private:
-  /// Carries a filter through an interval with this share of it in a spell. Returns whether the motion shows spells.
-  bool carry(History& h, std::size_t i, double share, double variance_s) {
+  /// Carries a filter through an interval of this branch. Returns whether the motion shows spells.
+  bool carry(History& h, std::size_t i, const SpellBranch& branch) {
     LogLikelihood counted;
     bool driven = false;
     const double before_s = samples_[i - 1].time_s;
-    h.filter.in_spell(share, variance_s, false);
+    h.filter.in_spell(branch.share, branch.variance_s, false);
     h.filter.at_boundary((*view_.at_boundary)[i - 1] || (*view_.at_boundary)[i]);
     sub_steps(*view_.clock, before_s, samples_[i].time_s,
               [&](double t, double step_s, const CommandState& commands) {
@@ -78,41 +73,29 @@ class SpellFilter {
     h.log_weight += counted.sum;
     return driven && free;
   }
-  void add(History h, std::size_t i, bool in_spell, double share, std::uint32_t what) {
-    const double length_s = samples_[i].time_s - samples_[i - 1].time_s;
-    h.lasted_s = !in_spell ? 0 : h.in_spell ? h.lasted_s + length_s : share * length_s;
-    h.in_spell = in_spell;
-    nodes_.push_back({h.node, static_cast<float>(share), in_spell});
+  void add(History h, const SpellBranch& branch) {
+    h.spell = branch.after;
+    h.log_weight += branch.log_probability;
+    nodes_.push_back({h.node, static_cast<float>(branch.share), h.spell.in_spell});
     h.node = static_cast<std::ptrdiff_t>(nodes_.size()) - 1;
-    constexpr std::uint32_t kRecent = 0xffff;
-    h.recent = (h.recent << 2 | what) & kRecent;
     next_.push_back(std::move(h));
   }
   void interval(std::size_t i) {
     const double length_s = samples_[i].time_s - samples_[i - 1].time_s;
     next_.clear();
     for (const History& h : histories_) {
-      const double stay =
-          h.in_spell ? stalls_.survival(h.lasted_s + length_s) / std::max(stalls_.survival(h.lasted_s), 1e-300)
-                     : std::exp(-length_s / stalls_.mean_apart_s);
-      const double log_stay = std::log(std::max(stay, 1e-300)), log_go = std::log(std::max(1 - stay, 1e-12));
+      const SpellBranch stays = spell_stays(stalls_, h.spell, length_s);
       History same = h;
-      const bool shown = carry(same, i, h.in_spell ? 1 : 0, 0);
-      same.log_weight += log_stay;
-      const bool divide = histories_.size() > 1 || h.in_spell || distance2_ > kBenign;
-      if (divide && !shown) {
-        History other = same;
-        other.log_weight += log_go - log_stay;
-        add(std::move(other), i, !h.in_spell, 0.5, 2);
-      }
-      for (int part = 0; divide && shown && part < kParts; ++part) {
-        History other = h;
-        const double share = (part + 0.5) / kParts;
-        carry(other, i, share, length_s / (12.0 * kParts * kParts));
-        other.log_weight += log_go - std::log(kParts);
-        add(std::move(other), i, !h.in_spell, share, static_cast<std::uint32_t>(part) + 1);
-      }
-      add(std::move(same), i, h.in_spell, h.in_spell ? 1 : 0, 0);
+      const bool shown = carry(same, i, stays);
+      const bool divide = histories_.size() > 1 || h.spell.in_spell || distance2_ > kBenignForSpells;
+      if (divide && !shown) add(same, spell_changes_unseen(stalls_, h.spell, length_s));
+      if (divide && shown)
+        for (const SpellBranch& change : spell_changes(stalls_, h.spell, length_s)) {
+          History other = h;
+          carry(other, i, change);
+          add(std::move(other), change);
+        }
+      add(std::move(same), stays);
     }
     prune();
   }
@@ -122,9 +105,8 @@ class SpellFilter {
                      [](const History& a, const History& b) { return a.log_weight > b.log_weight; });
     histories_.clear();
     for (History& h : next_) {
-      const auto like = std::find_if(histories_.begin(), histories_.end(), [&](const History& k) {
-        return k.in_spell == h.in_spell && k.recent == h.recent;
-      });
+      const auto like = std::find_if(histories_.begin(), histories_.end(),
+                                     [&](const History& k) { return k.spell.like(h.spell); });
       if (like != histories_.end()) {
         like->log_weight = log_sum(like->log_weight, h.log_weight);
       } else if (histories_.size() < kMostHypotheses &&

@@ -11,7 +11,7 @@
 namespace kilotwin::identify {
 
 /// By which the profile log likelihood of a step's point falls at the ends of a 95 % interval: half the quantile of a statistic x with
-/// the distribution (1 - exp(-x / 2))^2 (Hansen, Econometrica 68, 2000).
+/// the distribution (1 - exp(-x / 2))^2 (Hansen, Econometrica 68, 2000): -log(1 - sqrt(0.95)).
 inline constexpr double kStepDrop95 = 3.676;
 
 /// A point at which a term steps, or a radius within which it counts neighbours, and the ends of its 95 % interval.

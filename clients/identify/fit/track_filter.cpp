@@ -48,13 +48,12 @@ TrackFilter::TrackFilter(const MotionModel& model, const RobotBias& bias, std::u
   place_.robot = robot;
   place_.run = run;
   if (!model.stalls) return;
-  spell_share_ = model.stalls->share();
-  spell_variance_s_ = model.stalls->variance_s(kSpellKept_s);
+  spell_share_ = random_share_ = model.stalls->share();
+  spell_variance_s_ = random_variance_s_ = model.stalls->variance_s(kSpellKept_s);
 }
 
 void TrackFilter::begin_forecast() {
-  if (model_->stalls && !forecasting_)
-    in_spell(model_->stalls->share(), model_->stalls->variance_s(kSpellKept_s), false);
+  if (!forecasting_) in_spell(random_share_, random_variance_s_, false);
   forecasting_ = true;
 }
 

@@ -127,6 +127,7 @@ class TrackFilter {
   bool at_boundary_ = false;
   bool within_walls_ = false;
   double spell_share_ = 0, spell_variance_s_ = 0;
+  double random_share_ = 0, random_variance_s_ = 0;  ///< the same at a random instant
   bool spell_unsure_ = false;
 };
 

@@ -8,6 +8,7 @@
 
 #include "clients/identify/kilogrid/floor_program.hpp"
 #include "core/stats/moments.hpp"
+#include "core/stats/quantiles.hpp"
 #include "core/stats/resampling.hpp"
 
 namespace kilotwin::kilogrid {
@@ -90,7 +91,7 @@ class Logistic {
   Eigen::VectorXd weights_;
 };
 
-/// Boosted decision stumps: thresholds at deciles of single features, with shrinkage one half.
+/// Boosted decision stumps: thresholds at sixteenths of single features, with shrinkage one half.
 class Boosted {
  public:
   explicit Boosted(const Samples& s) {
@@ -99,10 +100,9 @@ class Boosted {
     std::vector<std::vector<double>> thresholds;
     for (Eigen::Index f = 0; f < s.x.cols(); ++f) {
       std::vector<double> v(s.x.col(f).data(), s.x.col(f).data() + rows);
-      std::sort(v.begin(), v.end());
       std::vector<double>& own = thresholds.emplace_back();
       for (int t = 1; t <= kThresholds; ++t)
-        own.push_back(v[static_cast<std::size_t>(rows - 1) * static_cast<std::size_t>(t) / (kThresholds + 1)]);
+        own.push_back(stats::lower_quantile(v, static_cast<double>(t) / (kThresholds + 1)));
       own.erase(std::unique(own.begin(), own.end()), own.end());
     }
     const Eigen::VectorXd importance = class_weights(s.y);

@@ -135,8 +135,9 @@ NullDistribution::NullDistribution(const std::vector<std::vector<double>>& gains
   // The maximum over candidates follows an extreme-value distribution. The spread of log p is shrunk towards the
   // theoretical value, since there are few sets. Each set uses scales estimated from the others, as the measured
   // set does.
-  constexpr double kSpread = 1.2825, kLikeKnown = 10;
-  // Theoretical 0.99 quantile: (4.600 - 0.577) / 1.2825 = 3.14. The margin covers the uncertainty of the scales.
+  constexpr double kSpread = stats::kGumbelSd, kLikeKnown = 10;
+  // The 0.99 quantile, in standard deviations, is stats::gumbel_quantile(0.99, 0, 1) = 3.14. The margin covers the
+  // uncertainty of the scales.
   constexpr double kQuantile = 3.5;
   const auto sets = static_cast<double>(gains.size());
   double mean = 0, square = 0;

@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <optional>
+#include <utility>
 
 #include "core/csv/csv_reader.hpp"
 
@@ -33,17 +35,21 @@ bool has_floor_columns(const CsvReader& csv) {
          !csv.find_column("run") && !csv.find_column("heading_rad");
 }
 
-/// Why no single robot can have produced the track; empty if one can.
-std::string fault_of(const FloorTrack& track) {
-  if (track.size() < kFewestReports) return fmt::format("only {} reports", track.size());
+/// Why no single robot can have produced the track; nothing if one can.
+std::optional<FloorFault> fault_of(const FloorTrack& track) {
+  using Kind = FloorFault::Kind;
+  if (track.size() < kFewestReports)
+    return FloorFault{track.robot, Kind::kFewReports, fmt::format("only {} reports", track.size())};
   std::size_t wrong_rows = 0;
   for (std::size_t i = 1; i < track.size(); ++i) {
     const double way_mm = std::hypot(track.x_mm[i] - track.x_mm[i - 1], track.y_mm[i] - track.y_mm[i - 1]);
     wrong_rows += track.time_s[i] - track.time_s[i - 1] <= kReach_s && way_mm > kReach_mm ? 1u : 0u;
   }
   const double share = static_cast<double>(wrong_rows) / static_cast<double>(track.size());
-  return share > kMostWrongRows ? fmt::format("in two places at once in {:.0f} % of its rows", 100 * share)
-                                : std::string();
+  if (share > kMostWrongRows)
+    return FloorFault{track.robot, Kind::kTwoPlaces,
+                      fmt::format("in two places at once in {:.0f} % of its rows", 100 * share)};
+  return std::nullopt;
 }
 
 /// Removes rows far from both neighbours in time.
@@ -91,8 +97,8 @@ FloorRun read_floor_run(CsvReader csv, const std::string& name, const Floor& flo
   }
   for (auto& [robot, track] : tracks) {
     track.robot = robot;
-    if (std::string fault = fault_of(track); !fault.empty()) {
-      run.faults.push_back({robot, std::move(fault)});
+    if (std::optional<FloorFault> fault = fault_of(track)) {
+      run.faults.push_back(std::move(*fault));
       continue;
     }
     drop_slips(track);

@@ -19,8 +19,10 @@ struct FloorTrack {
 
 /// A robot whose rows are not plausible.
 struct FloorFault {
+  enum class Kind : std::uint8_t { kFewReports, kTwoPlaces };
   std::uint32_t robot;
-  std::string reason;
+  Kind kind;
+  std::string reason;  ///< in words
 };
 
 struct FloorRun {

@@ -6,6 +6,7 @@
 #include "clients/identify/kilogrid/floor_classifier.hpp"
 #include "clients/identify/result/values.hpp"
 #include "core/os/worker_pool.hpp"
+#include "core/stats/distributions.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
@@ -38,8 +39,8 @@ struct MeanArea {
   [[nodiscard]] identification::Area area() const {
     identification::Area out;
     out.set_area(value());
-    out.set_low(value() - 1.96 * sd());
-    out.set_high(value() + 1.96 * sd());
+    out.set_low(value() - stats::kNormal95 * sd());
+    out.set_high(value() + stats::kNormal95 * sd());
     out.set_pairs(count);
     return out;
   }
@@ -116,7 +117,7 @@ identification::Accuracy accuracy_of(const Validation& judged) {
   const double mean = judged.sum / n;
   double spread = 0;
   for (const auto& [sum, count] : judged.by_robot) spread += (sum - mean * count) * (sum - mean * count);
-  const double half = 1.96 * std::sqrt(spread) / n;
+  const double half = stats::kNormal95 * std::sqrt(spread) / n;
   identification::Accuracy out;
   *out.mutable_rmse_mm() = identify::json_value(judged.rmse_mm());
   out.set_rmse_low_mm(std::sqrt(std::max(mean - half, 0.0)));

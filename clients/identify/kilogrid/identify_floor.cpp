@@ -68,7 +68,7 @@ void add_faults(identification::Result& result, const std::vector<FloorRun>& run
   for (const FloorRun& run : runs) {
     for (const FloorFault& found : run.faults) {
       identification::Fault& fault = *result.add_faults();
-      fault.set_kind(found.reason.starts_with("in two") ? "duplicated" : "silent");
+      fault.set_kind(found.kind == FloorFault::Kind::kTwoPlaces ? "duplicated" : "silent");
       fault.set_run(run.name);
       *fault.mutable_robot() = json_value(found.robot);
       fault.set_in_words(fmt::format("{}, robot {}: {}", run.name, found.robot, found.reason));

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/pose.hpp"
+#include "core/effects/episodes.hpp"
 #include "core/math/elementary.h"
 #include "core/plan/from_manifest.hpp"
 
@@ -28,7 +29,10 @@ SingleRobot::SingleRobot(const Floor& floor, const FloorSettings& settings) : fl
     if (effect.during_size() == 0) term.commands = 0xe;
     for (const Function& f : effect.function()) {
       const double correlation_s = f.noise().correlation_s();
-      Factor factor{EffectFunction(settings_of(f)),
+      const FunctionSettings settings_of_f = settings_of(f);
+      const EpisodesShape episodes =
+          settings_of_f.episodes() != nullptr ? *settings_of_f.episodes() : EpisodesShape{};
+      Factor factor{EffectFunction(settings_of_f),
                     f.of(),
                     f.and_of(),
                     std::nullopt,
@@ -36,10 +40,7 @@ SingleRobot::SingleRobot(const Floor& floor, const FloorSettings& settings) : fl
                     f.has_episodes(),
                     correlation_s,
                     correlation_s > 0 ? kt_exp(-kStep_s / correlation_s) : 0,
-                    f.episodes().mean_apart_s(),
-                    f.episodes().scale_s(),
-                    f.episodes().tail(),
-                    f.episodes().longest_s()};
+                    episodes};
       if (factor.is_noise || factor.is_episodes) factor.slot = slots_++;
       if (f.of() == Function::DENSITY) neighbour_radius_mm_ = f.radius_mm();
       term.factors.push_back(std::move(factor));
@@ -64,7 +65,7 @@ RobotState SingleRobot::start(std::uint32_t number, double x_mm, double y_mm, do
   for (const Term& term : terms_) {
     for (const Factor& factor : term.factors) {
       if (factor.is_noise) state.memory[*factor.slot] = dice.normal();
-      if (factor.is_episodes) state.memory[*factor.slot] = -factor.apart_s * kt_log(dice.uniform());
+      if (factor.is_episodes) state.memory[*factor.slot] = episode_wait_s(factor.episodes, dice.uniform());
     }
   }
   keep_inside(state);
@@ -196,10 +197,9 @@ void SingleRobot::remember(RobotState& state, Dice& dice) const {
         // Counts down to the next episode, then up to its end.
         const bool on = slot < 0;
         slot += on ? kStep_s : -kStep_s;
-        if (on && slot >= 0) slot = -factor.apart_s * kt_log(dice.uniform());
+        if (on && slot >= 0) slot = episode_wait_s(factor.episodes, dice.uniform());
         if (!on && slot <= 0) {
-          slot = -std::clamp(factor.scale_s * (kt_pow(dice.uniform(), -1 / factor.tail) - 1), kStep_s,
-                             factor.longest_s);
+          slot = -std::clamp(episode_length_s(factor.episodes, dice.uniform()), kStep_s, factor.episodes.longest_s);
         }
       }
     }

@@ -48,7 +48,7 @@ class SingleRobot {
     std::optional<std::size_t> slot;  ///< index into RobotState::memory
     bool is_noise, is_episodes;
     double correlation_s, keep;  ///< keep: correlation of noise from step to step
-    double apart_s, scale_s, tail, longest_s;
+    EpisodesShape episodes;
   };
   struct Term {
     bool left_gain, right_gain;  ///< the wheels on whose gain it acts

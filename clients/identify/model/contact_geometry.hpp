@@ -8,6 +8,8 @@
 #include <limits>
 #include <vector>
 
+#include "core/base/pose.hpp"
+
 namespace kilotwin::identify {
 
 /// Bounds of the disc centres, mm. Infinite: no wall on that side.
@@ -33,7 +35,7 @@ struct Walls {
 
 /// Robots with centres this close may be in contact, mm: one diameter of 33 mm, and the motion between samples.
 inline constexpr double kContactRange_mm = 36;
-inline constexpr double kDiscDiameter_mm = 33;
+inline constexpr double kDiscDiameter_mm = 2 * kRobotRadius_mm;
 inline constexpr double kWallMargin_mm = 4;
 
 /// Separates overlapping discs by half the overlap each. Returns whether any overlapped. NaN: the robot is absent.

@@ -79,6 +79,7 @@ proto::Model proto_of(const MotionModel& fitted) {
     episodes.set_scale_s(rounded(fitted.stalls->scale_s));
     episodes.set_tail(rounded(fitted.stalls->tail));
     episodes.set_longest_s(rounded(fitted.stalls->longest_s));
+    if (fitted.stalls->shape != 1) episodes.set_shape(rounded(fitted.stalls->shape));
   }
   std::set<std::string> names;
   std::map<std::string, int> terms_named;

@@ -7,34 +7,78 @@
 namespace kilotwin::identify {
 namespace {
 
+/// (t / scale)^shape.
+double power_of(const Stalls& stalls, double t_s) {
+  const double in_scales = t_s / stalls.scale_s;
+  return stalls.shape == 1 ? in_scales : std::pow(in_scales, stalls.shape);
+}
+
 /// Integral of the survival function from t_s to the longest duration, in units of the scale; tail above 1.
 double survival_beyond(const Stalls& stalls, double t_s) {
-  const auto power = [&](double s) { return std::pow(1 + s / stalls.scale_s, 1 - stalls.tail); };
-  return std::max(0.0, power(std::min(t_s, stalls.longest_s)) - power(stalls.longest_s)) / (stalls.tail - 1);
+  if (stalls.shape == 1) {
+    const auto power = [&](double s) { return std::pow(1 + s / stalls.scale_s, 1 - stalls.tail); };
+    return std::max(0.0, power(std::min(t_s, stalls.longest_s)) - power(stalls.longest_s)) / (stalls.tail - 1);
+  }
+  // Simpson's rule over log(1 + t / scale).
+  constexpr int kIntervals = 64;
+  const double from = std::log1p(std::min(t_s, stalls.longest_s) / stalls.scale_s),
+               step = (std::log1p(stalls.longest_s / stalls.scale_s) - from) / kIntervals;
+  double sum = 0;
+  for (int i = 0; i <= kIntervals; ++i) {
+    const double grown = std::exp(from + i * step);
+    const double weight = i == 0 || i == kIntervals ? 1 : i % 2 == 1 ? 4 : 2;
+    sum += weight * grown * std::pow(1 + power_of(stalls, stalls.scale_s * (grown - 1)), -stalls.tail);
+  }
+  return sum * step / 3;
 }
 
 /// Log likelihood of the durations, given that each was seen, plus the prior.
 double log_posterior(const std::vector<Spell>& spells, double least_s, const Stalls& stalls) {
-  constexpr double kTail = 2.5, kTail_sd = 0.6, kScale_s = 5, kScale_sd = 1.5;  // of the logarithms
+  constexpr double kTail = 2.5, kTail_sd = 0.6, kScale_s = 5, kScale_sd = 1.5,
+                   kShape_sd = 0.6;  // of the logarithms
+  const double unseen = stalls.tail * std::log1p(power_of(stalls, least_s)), of_scale = std::log(stalls.scale_s);
   double sum = 0;
   for (const Spell& spell : spells) {
-    const double t = std::max(spell.length_s, least_s);
-    sum += -stalls.tail * std::log1p(t / stalls.scale_s) + stalls.tail * std::log1p(least_s / stalls.scale_s);
-    if (!spell.censored) sum += std::log(stalls.tail / stalls.scale_s) - std::log1p(t / stalls.scale_s);
+    const double t = std::log(std::max(spell.length_s, least_s)) - of_scale,
+                 beyond = std::log1p(std::exp(stalls.shape * t));
+    sum += unseen - stalls.tail * beyond;
+    if (!spell.censored)
+      sum += std::log(stalls.tail * stalls.shape / stalls.scale_s) + (stalls.shape - 1) * t - beyond;
   }
   return sum - 0.5 * std::pow(std::log(stalls.tail / kTail) / kTail_sd, 2) -
-         0.5 * std::pow(std::log(stalls.scale_s / kScale_s) / kScale_sd, 2);
+         0.5 * std::pow((of_scale - std::log(kScale_s)) / kScale_sd, 2) -
+         0.5 * std::pow(std::log(stalls.shape) / kShape_sd, 2);
 }
 
 }  // namespace
 
-double Stalls::survival(double t_s) const { return t_s >= longest_s ? 0 : std::pow(1 + t_s / scale_s, -tail); }
+double Stalls::survival(double t_s) const {
+  return t_s >= longest_s ? 0 : std::pow(1 + power_of(*this, t_s), -tail);
+}
 
 double Stalls::mean_length_s() const { return scale_s * survival_beyond(*this, 0); }
 
-double Stalls::length_s(double u) const { return std::min(longest_s, scale_s * (std::pow(u, -1 / tail) - 1)); }
+double Stalls::length_s(double u) const {
+  const double power = std::pow(u, -1 / tail) - 1;
+  return std::min(longest_s, scale_s * (shape == 1 ? power : std::pow(power, 1 / shape)));
+}
+
+double Stalls::rest_after_s(double lasted_s, double u) const {
+  return std::max(0.0, length_s(u * survival(lasted_s)) - lasted_s);
+}
 
 double Stalls::rest_s(double u) const {
+  if (shape != 1) {
+    // A spell that lasts at a random instant lasts for t more with the probability survival_beyond(t) / survival_beyond(0).
+    constexpr int kHalvings = 40;
+    const double all = survival_beyond(*this, 0);
+    double low = 0, high = longest_s;
+    for (int i = 0; i < kHalvings; ++i) {
+      const double middle = (low + high) / 2;
+      (survival_beyond(*this, middle) > u * all ? low : high) = middle;
+    }
+    return (low + high) / 2;
+  }
   const double least = std::pow(1 + longest_s / scale_s, 1 - tail);
   return scale_s * (std::pow(least + u * (1 - least), 1 / (1 - tail)) - 1);
 }
@@ -55,20 +99,30 @@ double Stalls::variance_s(double over_s) const {
 }
 
 void fit_lengths(const std::vector<Spell>& spells, double least_s, Stalls& stalls) {
-  constexpr double kLeast_s = 0.3, kMost_s = 100, kLeastTail = 1.2, kMostTail = 12;
-  constexpr int kScales = 60, kTails = 40;
+  constexpr double kLeast_s = 0.3, kMost_s = 100, kLeastTail = 1.2, kMostTail = 12, kLeastShape = 1, kMostShape = 8;
+  constexpr int kScales = 60, kTails = 40, kShapes = 7;
+  /// Another shape has to make the durations this much more likely, nat.
+  constexpr double kShapeGain = 2;
+  const auto on_grid = [](double least, double most, int i, int count) {
+    return least * std::pow(most / least, static_cast<double>(i) / (count - 1));
+  };
   double best = -std::numeric_limits<double>::infinity();
   Stalls trial = stalls;
-  for (int i = 0; i < kScales; ++i) {
-    trial.scale_s = kLeast_s * std::pow(kMost_s / kLeast_s, static_cast<double>(i) / (kScales - 1));
-    for (int j = 0; j < kTails; ++j) {
-      trial.tail = kLeastTail * std::pow(kMostTail / kLeastTail, static_cast<double>(j) / (kTails - 1));
-      const double value = log_posterior(spells, least_s, trial);
-      if (!(value > best)) continue;
-      best = value;
-      stalls.scale_s = trial.scale_s;
-      stalls.tail = trial.tail;
+  for (int k = 0; k < kShapes; ++k) {
+    trial.shape = on_grid(kLeastShape, kMostShape, k, kShapes);
+    for (int i = 0; i < kScales; ++i) {
+      trial.scale_s = on_grid(kLeast_s, kMost_s, i, kScales);
+      for (int j = 0; j < kTails; ++j) {
+        trial.tail = on_grid(kLeastTail, kMostTail, j, kTails);
+        const double value = log_posterior(spells, least_s, trial);
+        if (!(value > best)) continue;
+        best = value;
+        stalls.scale_s = trial.scale_s;
+        stalls.tail = trial.tail;
+        stalls.shape = trial.shape;
+      }
     }
+    if (k == 0) best += kShapeGain;
   }
 }
 

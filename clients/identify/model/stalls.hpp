@@ -1,5 +1,6 @@
 /// Spells in which the wheels of a robot stand still, or slip, although a motor is on: rare events at random times. They follow
-/// `Episodes` of idl/effects.proto. The time from the end of a spell to the next is exponential, the duration has a Lomax distribution.
+/// `Episodes` of idl/effects.proto. The time from the end of a spell to the next is exponential, the duration has a Burr XII
+/// distribution (Lomax for a shape of 1).
 #pragma once
 
 #include <vector>
@@ -14,7 +15,8 @@ struct Spell {
 
 struct Stalls {
   double mean_apart_s = 300;
-  double scale_s = 5, tail = 2;  ///< P(duration > t) = (1 + t / scale_s)^-tail
+  double scale_s = 5, tail = 2;  ///< P(duration > t) = (1 + (t / scale_s)^shape)^-tail
+  double shape = 1;
   double longest_s = 3600;
   double gain = 0;  ///< factor of the wheels' speeds during a spell: 0 stands still
 
@@ -28,11 +30,13 @@ struct Stalls {
   [[nodiscard]] double length_s(double u) const;
   /// The same of the rest of a spell that lasts at a random instant.
   [[nodiscard]] double rest_s(double u) const;
+  /// The same of the rest of a spell that has lasted `lasted_s`.
+  [[nodiscard]] double rest_after_s(double lasted_s, double u) const;
   /// Variance of the time in spells during `over_s`, divided by `over_s`, s. Covariance of two instants: that of rare spells.
   [[nodiscard]] double variance_s(double over_s) const;
 };
 
-/// Scale and tail of maximum likelihood, with a weak prior. Spells shorter than `least_s` are not seen.
+/// Scale, tail and shape of maximum likelihood, with a weak prior. Spells shorter than `least_s` are not seen.
 void fit_lengths(const std::vector<Spell>&, double least_s, Stalls&);
 
 }  // namespace kilotwin::identify

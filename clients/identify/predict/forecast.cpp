@@ -79,7 +79,10 @@ class JointForecast {
       RolloutStart& start = robot.start;
       start.view = robot.view;
       start.weights = robot.weights;
-      for (const auto& h : bank->hypotheses()) start.filters.push_back(&h.filter);
+      for (const auto& h : bank->hypotheses()) {
+        start.filters.push_back(&h.filter);
+        start.spells.push_back(h.spell);
+      }
       start.now_s = robot.now_s;
     }
   }

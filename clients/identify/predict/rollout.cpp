@@ -54,10 +54,13 @@ Eigen::Matrix<double, n, 1> correlated(const Eigen::Matrix<double, n, n>& covari
 /// The spells of one robot in one rollout.
 class SpellDraws {
  public:
-  /// uniform(): the next random number.
+  /// uniform(): the next random number. `now`: if it is known.
   template <class Uniform>
-  SpellDraws(const Stalls& stalls, Uniform&& uniform) : stalls_(&stalls), in_spell_(uniform() < stalls.share()) {
-    left_s_ = in_spell_ ? stalls.rest_s(uniform()) : -stalls.mean_apart_s * std::log(uniform());
+  SpellDraws(const Stalls& stalls, const std::optional<SpellState>& now, Uniform&& uniform)
+      : stalls_(&stalls), in_spell_(now ? now->in_spell : uniform() < stalls.share()) {
+    left_s_ = !in_spell_ ? -stalls.mean_apart_s * std::log(uniform())
+              : now      ? stalls.rest_after_s(now->lasted_s, uniform())
+                         : stalls.rest_s(uniform());
   }
   /// Share of the next `for_s` in spells.
   template <class Uniform> double share(double for_s, Uniform&& uniform) {
@@ -115,7 +118,7 @@ class Rollout {
       Belief& belief = filter.belief();
       belief.mean += mirror_ * correlated<5>(belief.covariance, normals_.draw<5>(sample / 2, r, 0));
       belief.covariance.setZero();
-      if (model_.stalls) spells_.emplace_back(*model_.stalls, uniforms_of(r));
+      if (model_.stalls) spells_.emplace_back(*model_.stalls, robots_[r].spells[chosen], uniforms_of(r));
     }
   }
   /// `number`: of the step, from 1.

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "clients/identify/fit/filter_pass.hpp"
+#include "clients/identify/fit/spell_branches.hpp"
 #include "clients/identify/model/traffic_grids.hpp"
 
 namespace kilotwin::identify {
@@ -13,9 +15,10 @@ namespace kilotwin::identify {
 /// A robot at the start of the forecast.
 struct RolloutStart {
   const TrackView* view = nullptr;
-  std::vector<const TrackFilter*> filters;  ///< one per heading hypothesis
-  std::vector<double> weights;              ///< of the hypotheses, with sum 1
-  double now_s = 0;                         ///< time of the filters
+  std::vector<const TrackFilter*> filters;             ///< one per hypothesis
+  std::vector<double> weights;                         ///< of the hypotheses, with sum 1
+  double now_s = 0;                                    ///< time of the filters
+  std::vector<std::optional<SpellState>> spells = {};  ///< by hypothesis, for a model with stalls; none: at random
 };
 
 /// Moments of a measured position.

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "core/base/error.hpp"
+#include "core/base/pose.hpp"
 #include "core/csv/csv_reader.hpp"
 
 namespace kilotwin::radio_fit {
@@ -17,7 +18,7 @@ namespace fs = std::filesystem;
 
 /// Pitches of the known sets: robots in contact without pauses (33 mm), else 50 mm. With these, reception ends at
 /// the same distance, 130..150 mm.
-constexpr double kTouchingPitch_mm = 33, kPitch_mm = 50;
+constexpr double kTouchingPitch_mm = 2 * kRobotRadius_mm, kPitch_mm = 50;
 constexpr int kMostRobots = 1000;
 
 GridRun read_run(const fs::path& file) {

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "clients/identify/result/large_error.hpp"
+
 namespace kilotwin::identify::report {
 namespace {
 
@@ -63,7 +65,7 @@ void add_errors(Data& to, const Result& result, const Errors& e) {
   if (result.effects_size() == 0) {
     std::string none =
         result.check().dropped().empty() ? "No tested effect is significant." : "No effect is written.";
-    if (e.floor && *e.before > 1.15 * *e.floor)
+    if (e.floor && *e.before > kLargeErrorRatio * *e.floor)
       none += " The error above the noise floor depends on no tested covariate.";
     to.set("none", none);
     return;

@@ -12,6 +12,26 @@
 namespace kilotwin::identify::report {
 namespace {
 
+/// A target of effects, as results name it.
+struct TargetText {
+  const char* in_words;
+  bool measured = false;  ///< changes measurements, not motion
+};
+
+const std::map<std::string, TargetText>& targets() {
+  static const std::map<std::string, TargetText> kTargets = {{"WHEEL_GAIN", {"wheel speeds (gain)"}},
+                                                             {"WHEEL_OFFSET", {"wheel speeds (offset)"}},
+                                                             {"TURN_RATE", {"turn rate"}},
+                                                             {"BODY_DRIFT", {"drift in the body frame"}},
+                                                             {"WORLD_DRIFT", {"drift in the world frame"}},
+                                                             {"MEASURED_OFFSET", {"measured position", true}},
+                                                             {"MEASURED_BODY_OFFSET", {"tracked point", true}},
+                                                             {"MEASURED_SCALE", {"camera scale", true}},
+                                                             {"MEASURED_HEADING", {"measured heading", true}},
+                                                             {"NOISE", {"size of the motion noise"}}};
+  return kTargets;
+}
+
 /// A covariate as the object of "depends on ...".
 std::string phrase_of(const std::string& covariate) {
   static const std::map<std::string, std::string> kPhrases = {{"time", "time in the run"},
@@ -80,24 +100,15 @@ std::string covariates_of(const Texts& covariates) {
 }
 
 bool is_measurement(const identification::Effect& effect) {
-  return effect.acts_on().starts_with("MEASURED") ||
+  const auto target = targets().find(effect.acts_on());
+  return (target != targets().end() && target->second.measured) ||
          std::find(effect.covariates().begin(), effect.covariates().end(), "measurement") !=
              effect.covariates().end();
 }
 
 std::string acts_on_in_words(const std::string& acts_on) {
-  static const std::map<std::string, std::string> kWords = {{"WHEEL_GAIN", "wheel speeds (gain)"},
-                                                            {"WHEEL_OFFSET", "wheel speeds (offset)"},
-                                                            {"TURN_RATE", "turn rate"},
-                                                            {"BODY_DRIFT", "drift in the body frame"},
-                                                            {"WORLD_DRIFT", "drift in the world frame"},
-                                                            {"MEASURED_OFFSET", "measured position"},
-                                                            {"MEASURED_BODY_OFFSET", "tracked point"},
-                                                            {"MEASURED_SCALE", "camera scale"},
-                                                            {"MEASURED_HEADING", "measured heading"},
-                                                            {"NOISE", "size of the motion noise"}};
-  const auto at = kWords.find(acts_on);
-  return at == kWords.end() ? words_of(acts_on) : at->second;
+  const auto at = targets().find(acts_on);
+  return at == targets().end() ? words_of(acts_on) : at->second.in_words;
 }
 
 void set_text(Data& to, const std::string& name, const std::string& text) {

@@ -19,16 +19,19 @@ using Columns = Eigen::Matrix<double, 3, kAll>;
 using Normal = Eigen::Matrix<double, kAll, kAll>;
 using Numbers = Eigen::Matrix<double, kAll, 1>;
 
-/// Lever arm that converts rotations and scale changes to mm.
+/// Lever arm that converts rotations and scale changes to mm: about that of robots on a floor of 1 m. It sets the prior
+/// of both.
 constexpr double kArm_mm = 300;
-/// Largest plausible shift.
+/// Prior standard deviations: of shifts and of motions of robots, and of a robot's turn. Smaller ones would shrink
+/// large shifts.
 constexpr double kLargest_mm = 100, kLargest_rad = 1;
-/// Bound on the contribution of one track, in half chi squared.
+/// Bound on the contribution of one track, in half chi squared: five tracks at least make a certain shift.
 constexpr double kMostOfATrack = 5;
 /// Chance exceeds kCertain in one of 1e5 sets. kBeyondUsual: bound relative to other instants of the set.
 constexpr double kCertain = 25, kBeyondUsual = 18;
-/// The push must explain this much more to be preferred to a camera shift.
+/// The push must explain this much more to be preferred to a camera shift, nat. It has no rotation and no scale.
 constexpr double kClear = 2;
+/// Shifts of a set, and instants that are examined for one: they bound the cost. Later shifts stay in the residuals.
 constexpr int kMostShifts = 8, kMostLooks = 40;
 
 /// The innovation of one robot at one instant.
@@ -114,13 +117,14 @@ class Instant {
   /// Robust least squares.
   [[nodiscard]] Numbers fit(Explanation explanation, Normal* information = nullptr) const {
     Numbers at = Numbers::Zero();
-    for (int pass = 0; pass < 4; ++pass) {
+    constexpr int kPasses = 4;  // of reweighting; bounds the cost per instant
+    for (int pass = 0; pass < kPasses; ++pass) {
       Normal normal = prior();
       Numbers score = Numbers::Zero();
       for (const InstantInnovation* s : seen_) {
         const Columns columns = allowed(*s, explanation);
         const double far = (s->whitened - columns * at).squaredNorm();
-        constexpr double kGate = 12;
+        constexpr double kGate = 12;  // chi squared with three degrees exceeds this in 0.7 % of the innovations
         const double weight = far > kGate ? kGate / far : 1;
         normal.noalias() += weight * columns.transpose() * columns;
         score.noalias() += weight * columns.transpose() * s->whitened;
@@ -206,7 +210,7 @@ Eigen::Vector4d usual_excess(const std::vector<Candidate>& all) {
       squares.push_back(c.size[i] * c.size[i]);
       expected.push_back(c.covariance(i, i));
     }
-    constexpr double kMedianOfChiSquared = 0.4549;
+    constexpr double kMedianOfChiSquared = 0.4549;  // with one degree of freedom: most instants have no shift
     excess[i] = std::max(0.0, stats::upper_median(squares) / kMedianOfChiSquared - stats::upper_median(expected));
   }
   return excess;
@@ -223,6 +227,8 @@ bool lasts(const Scan& scan, const Candidate& found, double frame_s) {
     for (int k = from; k <= to; ++k) sum += candidate_at(scan, found.time_s + k * frame_s).size.dot(along) / all;
     return sum / (to - from + 1);
   };
+  // Mean share of the displacement that other frames show. Noise alone gives about 0. A larger one takes gusts for
+  // shifts.
   constexpr double kMuch = 0.3;
   return share(-6, -2) > kMuch || share(4, 8) > kMuch;
 }
@@ -230,7 +236,7 @@ bool lasts(const Scan& scan, const Candidate& found, double frame_s) {
 /// Midpoint of the instants between two frames that give the same result.
 double middle_of(const Scan& scan, const Candidate& found, double step_s) {
   double low = found.time_s, high = found.time_s;
-  constexpr int kFine = 10;
+  constexpr int kFine = 10;  // parts of a step of the raster: the precision of the instant
   const auto same = [&](double t) { return std::abs(candidate_at(scan, t).gain - found.gain) < 1e-9; };
   for (int i = 1; i < kFine && same(found.time_s - i * step_s / kFine); ++i)
     low = found.time_s - i * step_s / kFine;
@@ -254,9 +260,9 @@ std::optional<CalibrationShift> find_calibration_shift(const Fitter& fitter, con
     from_s = std::min(from_s, track.of.front().from_s);
     to_s = std::max(to_s, track.of.back().to_s);
   }
-  constexpr std::size_t kFewest = 20;
+  constexpr std::size_t kFewest = 20;  // innovations, and instants: fewer give no usual variance of displacements
   if (steps.size() < kFewest) return std::nullopt;
-  constexpr int kMostInstants = 20000;
+  constexpr int kMostInstants = 20000;  // bounds the cost: long recordings get a raster coarser than half a frame
   const double frame_s = stats::upper_median(steps);
   const double step_s = std::max(frame_s / 2, (to_s - from_s) / kMostInstants);
 
@@ -345,7 +351,10 @@ Term term_of(const std::vector<CalibrationShift>& shifts, const std::array<bool,
       term.blocks.push_back({kTargets[t], basis, kAlways});
       for (const CalibrationShift* shift : own) {
         coefficients.push_back(shift->size[static_cast<Eigen::Index>(t)]);
-        const double sd = t < 2 ? 50 : 0.2;
+        // Prior standard deviations, mm, and rad or relative: far above those of a shift that was found, so that the
+        // fit moves freely.
+        constexpr double kShiftSd_mm = 50, kTurnSd = 0.2;
+        const double sd = t < 2 ? kShiftSd_mm : kTurnSd;
         precision.push_back(1 / (sd * sd));
       }
     }
@@ -375,11 +384,12 @@ std::vector<CalibrationShift> add_calibration_shifts(const Fitter& fitter, FitSt
     MotionModel with = model;
     with.terms.resize(place);
     // Displacement always; rotation and scale only if some shift needs them.
+    constexpr double kNeeded = 4;  // standard deviations; smaller components would follow noise in every shift
     std::array<bool, 4> components{true, true, false, false};
     for (const CalibrationShift& shift : shifts)
       for (Eigen::Index t = 2; t < 4; ++t)
         components[static_cast<std::size_t>(t)] =
-            components[static_cast<std::size_t>(t)] || std::abs(shift.size[t]) > 4 * shift.sd[t];
+            components[static_cast<std::size_t>(t)] || std::abs(shift.size[t]) > kNeeded * shift.sd[t];
     with.terms.push_back(term_of(shifts, components));
     model = with;
     fitted = false;

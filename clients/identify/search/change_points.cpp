@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
 #include <optional>
 #include <utility>
 
+#include "clients/identify/search/dictionary_builder.hpp"
 #include "clients/identify/search/local_quadratic.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
 
@@ -17,6 +19,9 @@ using Shape = Factor::Shape;
 
 constexpr std::size_t kMostPoints = 150, kMostSteps = 12;
 constexpr double kLeastGain = 2;
+/// Finest raster of instants. A wheel of 20 mm/s moves by 0.8 mm in this time, about the noise of a tracked position.
+/// Finer rasters cost a linearisation each, and no data locate an instant so well.
+constexpr double kFinest_s = 0.04;
 
 /// Step columns at chosen points in place of a block's curve, repeated for each target. Known factors stay.
 Block stepping(const Block& like, const std::vector<double>& points) {
@@ -192,7 +197,7 @@ bool put_steps(const Fitter& fitter, FitState& state, std::size_t place, const S
     place = model.terms.size() - 1;
   }
   double fine_s = apart_s / 5;
-  while (fine_s > 0.04) {
+  while (fine_s > kFinest_s) {
     std::vector<double> raster;
     for (const double t : at)
       for (int i = -kSide; i <= kSide; ++i) raster.push_back(t + i * fine_s);
@@ -248,6 +253,21 @@ struct StepRaster {
   double apart_s;
 };
 
+/// Whether all blocks act on targets of the groups, and depend on time or on nothing, at least one of them on time.
+bool is_over_time(const Term& term, std::initializer_list<const TargetGroup*> groups) {
+  bool over_time = false;
+  for (const Block& block : term.blocks) {
+    const bool of_groups = std::any_of(groups.begin(), groups.end(), [&](const TargetGroup* group) {
+      return std::find(group->targets.begin(), group->targets.end(), block.target) != group->targets.end();
+    });
+    const bool of_time = std::all_of(block.basis.factors.begin(), block.basis.factors.end(),
+                                     [](const Factor& f) { return f.axis.of == Covariate::kTime && !f.of_two(); });
+    if (!of_groups || !of_time) return false;
+    over_time = over_time || !block.basis.factors.empty();
+  }
+  return over_time;
+}
+
 /// Tries steps of the camera in place of a drift in the world, or the other way round. Contacts show which of the two moves: walls and
 /// contact noise that were fitted without the effect would decide at random, so both get their own. `cost`: of the term as it is.
 /// Returns whether the steps took its place.
@@ -261,7 +281,7 @@ bool became_other_motion(const Fitter& fitter, FitState& state, std::size_t plac
   choose_steps(fitter, state, place, raster.points, steps);
   FitState other = state;
   if (steps.at_s.empty() || !put_steps(fitter, other, place, steps, raster.apart_s)) return false;
-  other.model.terms[place].name = in_world ? "camera-by-time" : "drift-by-time";
+  other.model.terms[place].name = effect_name(in_world ? kCamera : kWorld, "time");
   double rise = fitter.fit_for_likelihood(other, 2);
   FitState own = state;
   if (state.model.walls.any()) {
@@ -292,6 +312,10 @@ bool only_rises(const Axis& axis) {
     default: return false;
   }
 }
+
+bool is_drift_over_time(const Term& term) { return is_over_time(term, {&kWorld}); }
+
+bool is_camera_over_time(const Term& term) { return is_over_time(term, {&kCamera, &kCameraPose}); }
 
 std::string find_change_points(const Fitter& fitter, FitState& state, std::size_t place) {
   const MotionModel& model = state.model;

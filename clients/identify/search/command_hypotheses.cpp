@@ -7,9 +7,12 @@ namespace {
 
 using Shape = Factor::Shape;
 
+// Sizes of the curves below are columns by which a test notices an effect: refinement adds the others. More columns
+// cost power and time; fewer miss curves with a late or a sharp rise.
+
 /// Duration of the previous command: after any command, or when driving straight (long turns persist).
 void add_duration_hypotheses(DictionaryBuilder& make, const Extent& extent, std::uint8_t straight_only) {
-  constexpr Eigen::Index kCurve = 3;
+  constexpr Eigen::Index kCurve = 3;  // one rise or fall over the duration, and its bend
   Factor lasted = over(Shape::kCosines, Covariate::kPreviousLasted, 0, extent.since_s, kCurve);
   lasted.warp = 1;
   for (const std::uint8_t during : {kDriven, straight_only}) {
@@ -26,7 +29,7 @@ void add_duration_hypotheses(DictionaryBuilder& make, const Extent& extent, std:
 
 /// A start that depends on the duration of the previous command, as after a long rest: after a rest, or after any command.
 void add_start_hypotheses(DictionaryBuilder& make, const Extent& extent) {
-  constexpr std::uint32_t kOverDuration = 3, kOverTime = 4;
+  constexpr std::uint32_t kOverDuration = 3, kOverTime = 4;  // with their constants: twelve columns together
   Factor lasted = over(Shape::kCosines, Covariate::kPreviousLasted, 0, extent.since_s, kOverDuration);
   Factor since = over(Shape::kCosines, Covariate::kSinceCommand, 0, extent.since_s, kOverTime);
   for (Factor* const f : {&lasted, &since}) {
@@ -44,10 +47,10 @@ void add_start_hypotheses(DictionaryBuilder& make, const Extent& extent) {
 /// The play of gears: a turn against the latest one begins otherwise than one that continues it.
 void add_reversal_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   if (!extent.has_turns) return;
-  constexpr Eigen::Index kCurve = 4;
+  constexpr Eigen::Index kCurve = 4;  // a start that fades, with its constant
   Factor since = over(Shape::kCosines, Covariate::kSinceCommand, 0, extent.since_s, kCurve);
   since.first = 0;
-  since.warp = 1;
+  since.warp = 1;  // s: the scale is fine in the first second, when robots start
   const std::vector<double> turns{2, 3};
   const Basis basis{{keyed(Shape::kTable, Covariate::kCommand, turns),
                      keyed(Shape::kTable, Covariate::kEarlierTurn, turns), since}};
@@ -153,7 +156,7 @@ void add_command_hypotheses(DictionaryBuilder& make, const Extent& extent) {
 void add_history_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   if (!extent.has_turns && !extent.has_stop) return;
   constexpr std::uint8_t kStraightOnly = 1u << 1;
-  constexpr Eigen::Index kCurve = 4;
+  constexpr Eigen::Index kCurve = 4;  // as after a reversal
   std::vector<double> before{kNoCommand};
   if (extent.has_turns) before.insert(before.begin(), {2, 3});
   const auto turns = static_cast<Eigen::Index>(before.size()) - 1;
@@ -213,6 +216,7 @@ void add_inertia_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   const std::vector<double> moving = moving_commands(extent);
   if (moving.size() + (extent.has_stop ? 1 : 0) < 2) return;
   // The rest of the motion under the previous command, and the part that the motion under the present one still lacks.
+  // Time constants, s, a factor of three apart: any one between has a close neighbour.
   const Factor since = keyed(Shape::kExponential, Covariate::kSinceCommand, {0.4, 1.2, 3.6});
   std::vector<Eigen::Index> columns;
   for (const Target target : {Target::kAhead, Target::kTurn}) {

@@ -36,6 +36,10 @@ double natural(Target target) {
 
 }  // namespace
 
+std::string effect_name(const TargetGroup& group, const std::string& of) {
+  return std::string(group.name) + "-by-" + of;
+}
+
 Factor over(Shape shape, Covariate of, double low, double high, std::uint32_t count) {
   Factor f;
   f.shape = shape;
@@ -102,7 +106,7 @@ void DictionaryBuilder::add(const std::string& name, std::vector<std::string> co
 void DictionaryBuilder::add(const TargetGroup& group, const std::string& of, std::vector<std::string> words,
                             std::vector<Eigen::Index> columns, double choices) {
   words.insert(words.begin(), group.words.begin(), group.words.end());
-  add(std::string(group.name) + "-by-" + of, std::move(words), group.in_words, std::move(columns), choices);
+  add(effect_name(group, of), std::move(words), group.in_words, std::move(columns), choices);
 }
 
 std::vector<Eigen::Index> DictionaryBuilder::curve(const TargetGroup& group, const std::string& of,

@@ -28,6 +28,9 @@ inline const TargetGroup kCameraPose{
     "camera", "measured position", {Target::kMeasuredTurn, Target::kMeasuredScale}, {"measurement"}};
 inline const TargetGroup kCompass{"compass", "measured heading", {Target::kMeasuredHeading}, {"measurement"}};
 
+/// Name of the effects of a group by a covariate: "drift-by-time".
+[[nodiscard]] std::string effect_name(const TargetGroup&, const std::string& of);
+
 /// A factor of `count` columns over a range of a covariate.
 [[nodiscard]] Factor over(Factor::Shape, Covariate of, double low, double high, std::uint32_t count);
 /// A factor with one column per point.

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "clients/identify/search/circle_edges.hpp"
+#include "clients/identify/search/dictionary_builder.hpp"
 #include "clients/identify/search/map_parts.hpp"
 #include "clients/identify/search/moving_circles.hpp"
 #include "clients/identify/search/number_steps.hpp"
@@ -18,7 +20,6 @@ namespace {
 using Shape = Factor::Shape;
 
 constexpr std::size_t kMostParts = 3;
-constexpr const char* kOfPosition = "speed-by-position";
 /// A further part explains at least this share of the map's variance. Beside a high step, a slope is a small share and many nats.
 constexpr double kLeastShare = 0.003;
 /// Parts have far fewer numbers than the map: the loss of log likelihood that they may have, absolute and as a share of what the
@@ -204,9 +205,11 @@ bool replace_by_parts(const Fitter& fitter, FitState& state, std::size_t place, 
   const bool moves = is_of_motion(state.model.terms[place]);
   const std::optional<Target> target = moves ? Target::kGain : target_of_map(state.model.terms[place]);
   if (!target || state.tracks.work() >= most_work) return false;
-  const bool named = std::any_of(state.model.terms.begin(), state.model.terms.end(),
-                                 [](const Term& term) { return term.name == kOfPosition; });
-  if (moves && named) return false;
+  // Names are the keys of a result: steps and ambiguities refer to terms by them.
+  const std::string of_position = effect_name(kSpeed, "position");
+  const bool taken = std::any_of(state.model.terms.begin(), state.model.terms.end(),
+                                 [&](const Term& term) { return term.name == of_position; });
+  if (moves && taken) return false;
   const Extent extent = extent_of(state.tracks);
   std::vector<MapPoint> map = positions_of(state.tracks);
   add_effect(map, state.model.terms[place], *target, 1);
@@ -227,7 +230,7 @@ bool replace_by_parts(const Fitter& fitter, FitState& state, std::size_t place, 
     if (!part) break;
     if (n == 1)
       parts.model.terms.insert(parts.model.terms.begin() + static_cast<std::ptrdiff_t>(place),
-                               Term{moves ? kOfPosition : state.model.terms[place].name, {}, {}, {}});
+                               Term{moves ? of_position : state.model.terms[place].name, {}, {}, {}});
     const double fewer = n == 1 ? -INFINITY : fitter.log_likelihood(parts);
     add_curve(fitter, parts, place, *target, *part);
     if (!lies_within(parts.model.terms[place], extent) || !(fitter.log_likelihood(parts) > fewer + kLoss)) break;

@@ -305,7 +305,7 @@ bool refine_moving_circle(const Fitter& fitter, FitState& state, std::size_t pla
   bool changed = move_numbers(fitter, state, steps, likelihood);
   changed = set_still(fitter, state, place, likelihood) || changed;
   const MovingPoint& centre = state.model.terms[place].blocks.front().basis.factors.front().axis.point;
-  state.model.terms[place].name = centre.stands() ? "speed-by-position" : "speed-by-position-and-time";
+  state.model.terms[place].name = effect_name(kSpeed, centre.stands() ? "position" : "position-and-time");
   return changed;
 }
 

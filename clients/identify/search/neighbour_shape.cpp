@@ -20,6 +20,12 @@ constexpr std::size_t kMostForms = 5;
 /// Forms chosen in the first round: the quadratic approximation is inaccurate far from its centre.
 constexpr std::size_t kFirstForms = 2;
 constexpr std::size_t kMostCounted = 6;
+/// Radii within which the density hardly ever exceeds this have no sums: it is that of one robot at 88 % of the radius.
+/// Smaller values admit radii over which sums have next to no range.
+constexpr double kLeastDensity = 0.05;
+/// Range of the prior's scale, in units of the target: of a gain, from 0.4 % to several times the speed. The evidence
+/// has its maximum between; a wider range costs time only.
+constexpr double kSmallestScale = 0.004, kMostScale = 8;
 
 /// Indices in kNeighbourRadii_mm (50, 70, 80, 100, 120, 150 mm) of directional sums.
 constexpr std::array<std::uint8_t, 6> kDirected = {1, 3, 4, 6, 8, 11};
@@ -98,7 +104,7 @@ std::vector<Form> forms_of_speed(const PreparedSet& set, std::uint8_t during) {
     table.axis = {Covariate::kNeighbours, r};
     for (std::size_t n = 1; n <= kMostCounted; ++n) table.points.push_back(static_cast<double>(n));
     if (r > 0) add(table);
-    if (most[r] < 0.05) continue;
+    if (most[r] < kLeastDensity) continue;
     Factor sum;
     sum.axis = {Covariate::kDensity, r};
     sum.high = most[r];
@@ -113,7 +119,7 @@ std::vector<Form> forms_of_speed(const PreparedSet& set, std::uint8_t during) {
   }
   // Directional sums: ahead, or behind.
   for (const std::uint8_t r : kDirected) {
-    if (most[r] < 0.05) continue;
+    if (most[r] < kLeastDensity) continue;
     for (const Covariate of : {Covariate::kNeighbours, Covariate::kDensity})
       for (const std::uint8_t focus : kFoci)
         for (const int degrees : {0, 180}) add(levelling(toward(of, r, focus, degrees)));
@@ -146,7 +152,7 @@ std::vector<Form> forms_of_push(const PreparedSet& set, bool turns, std::uint8_t
     forms.push_back(std::move(form));
   };
   for (const std::uint8_t r : kDirected) {
-    if (most[r] < 0.05) continue;
+    if (most[r] < kLeastDensity) continue;
     for (const Covariate of : {Covariate::kNeighbours, Covariate::kDensity}) {
       // Angular harmonics one to three of the nearest's direction.
       if (turns)
@@ -280,8 +286,8 @@ class Choice {
         if (std::find(chosen.forms.begin(), chosen.forms.end(), f) != chosen.forms.end()) continue;
         const Eigen::MatrixXd information = left(columns_[f], columns_[f]);
         const Eigen::VectorXd own_score = score(columns_[f]);
-        double size = 0.004;
-        while (size < 8) {
+        double size = kSmallestScale;
+        while (size < kMostScale) {
           const double value = log_evidence(information, own_score, size * sd_[f]);
           if (!(value <= best)) {
             best = value;

@@ -9,6 +9,7 @@
 
 #include "clients/identify/search/amplitudes.hpp"
 #include "clients/identify/search/calibration_shifts.hpp"
+#include "clients/identify/search/change_points.hpp"
 #include "clients/identify/search/search_loop.hpp"
 #include "clients/identify/search/simplification.hpp"
 
@@ -170,9 +171,7 @@ bool SearchLoop::lag_explains(const Finding& best) {
 
 bool SearchLoop::accept_calibration_shifts() {
   // A smooth curve of a drift with sudden ends leaves residuals that look like shifts.
-  if (std::any_of(out_.fit.model.terms.begin(), out_.fit.model.terms.end(),
-                  [](const Term& term) { return term.name == "drift-by-time"; }))
-    return false;
+  if (std::any_of(out_.fit.model.terms.begin(), out_.fit.model.terms.end(), is_drift_over_time)) return false;
   const std::vector<CalibrationShift> shifts = add_calibration_shifts(fitter_, out_.fit, kRemnant * explained());
   if (shifts.empty()) return false;
   fitter_.fit_contacts(out_.fit);
@@ -189,7 +188,7 @@ bool SearchLoop::accept_calibration_shifts() {
   }
   const std::vector<std::string> covariates{"measurement", "time"}, world{"world_frame", "time"};
   out_.reasons.push_back({covariates, "measured position", finding, std::log10(ScoreTest::kFamilyAlarm)});
-  if (pushed) out_.ambiguous.push_back({kCalibrationShiftsName, "drift-by-time", covariates, world, 0});
+  if (pushed) out_.ambiguous.push_back({kCalibrationShiftsName, effect_name(kWorld, "time"), covariates, world, 0});
   out_.steps.push_back({kCalibrationShiftsName, finding.evidence});
   return true;
 }

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "clients/identify/search/amplitudes.hpp"
+#include "clients/identify/search/change_points.hpp"
 #include "clients/identify/search/products.hpp"
 #include "clients/identify/search/search_loop.hpp"
 #include "clients/identify/search/target_extension.hpp"
@@ -152,11 +153,10 @@ bool SearchLoop::exchanged_for(std::size_t place, const Contender& other) {
 }
 
 void SearchLoop::try_camera_motion() {
-  const auto drift = std::find_if(out_.fit.model.terms.begin(), out_.fit.model.terms.end(),
-                                  [](const Term& term) { return term.name == "drift-by-time"; });
+  const auto drift = std::find_if(out_.fit.model.terms.begin(), out_.fit.model.terms.end(), is_drift_over_time);
   // Once only: otherwise the search could alternate between both.
   if (drift == out_.fit.model.terms.end() ||
-      !failed_.insert({Attempt::Kind::kExchange, {"camera-by-time", "drift-by-time"}}).second)
+      !failed_.insert({Attempt::Kind::kExchange, {effect_name(kCamera, "time"), drift->name}}).second)
     return;
   const auto place = static_cast<std::size_t>(drift - out_.fit.model.terms.begin());
   const bool at_rest = std::any_of(drift->blocks.begin(), drift->blocks.end(),
@@ -165,7 +165,7 @@ void SearchLoop::try_camera_motion() {
   const Hypothesis* best = nullptr;
   Finding best_finding;
   for (const Hypothesis& h : dictionary_.hypotheses) {
-    if (h.name != "camera-by-time") continue;
+    if (!is_camera_over_time(dictionary_.term_of(h, 1))) continue;
     const Finding finding = score_test_->evidence_of(h, static_cast<int>(place));
     if (best != nullptr && !(finding.evidence > best_finding.evidence)) continue;
     best = &h;

@@ -291,11 +291,12 @@ bool simplify_to_switch(const Fitter& fitter, FitState& state, std::size_t place
 }
 
 bool is_constant_drift(const Term& term) {
-  return term.name != "drift-at-rest" && !term.blocks.empty() &&
-         std::all_of(term.blocks.begin(), term.blocks.end(), [](const Block& block) {
-           return block.basis.factors.empty() &&
-                  (block.target == Target::kWorldX || block.target == Target::kWorldY);
-         });
+  const auto is_constant = [](const Block& block) {
+    return block.basis.factors.empty() && (block.target == Target::kWorldX || block.target == Target::kWorldY);
+  };
+  const auto acts_while_driven = [](const Block& block) { return (block.during & kDriven) != 0; };
+  return std::all_of(term.blocks.begin(), term.blocks.end(), is_constant) &&
+         std::any_of(term.blocks.begin(), term.blocks.end(), acts_while_driven);
 }
 
 bool simplify(const Fitter& fitter, FitState& state, std::size_t place) {

@@ -19,6 +19,14 @@ using Shape = Factor::Shape;
 constexpr std::size_t kMapFolds = 4;
 /// Least cross-validated gain in log likelihood.
 constexpr double kLeastMapEvidence = 15;
+/// Fewest nodes along each axis: a smooth map has waves up to order eight, so that fewer nodes add nothing.
+constexpr int kFewestNodes = 8;
+/// Penalties that the cross-validation tries. Slopes between nodes below `soft` cost like squares, those above like
+/// edges: the finest one, a usual one and a coarse one. A larger `soft` smooths more; more values cost one fit per fold
+/// each.
+constexpr double kSoftFine = 0.004, kSoftUsual = 0.01, kSoftCoarse = 0.04;
+/// Power of the penalty that favours few high steps.
+constexpr double kPowerOfSteps = 0.3;
 
 /// Size of a usual effect on the target over that of a gain: maps are fitted in this unit, so that one penalty serves all targets.
 double unit_of(Target target) {
@@ -88,7 +96,8 @@ class FineSums {
     if (map_.target == Target::kTurn) return {-half_base_mm * unit, half_base_mm * unit};
     double own = 0;
     map_.basis.evaluate(record.middle, 0, &own);
-    const double factor = std::max(0.05, std::abs(1 + own));
+    constexpr double kLeastFactor = 0.05;  // keeps the quotient finite where the map stops the wheels
+    const double factor = std::max(kLeastFactor, std::abs(1 + own));
     return {r.left_base_mm_s * r.left_gain / factor, r.right_base_mm_s * r.right_gain / factor};
   }
   void add(int i, int j, const Eigen::Vector3d& force) {
@@ -320,7 +329,7 @@ void fit_total_variation_map(const Fitter& fitter, FitState& state, std::size_t 
   Fitted map;
   map.target = first->target;
   map.grid = grid_of(state.tracks);
-  if (map.grid.columns < 8 || map.grid.rows < 8) return;
+  if (map.grid.columns < kFewestNodes || map.grid.rows < kFewestNodes) return;
   map.fixed = fixed_factors(*first);
   map.f = sampled(state.model.terms[place], map.grid, map.target);
   FitState trial = state;
@@ -347,9 +356,9 @@ void fit_total_variation_map(const Fitter& fitter, FitState& state, std::size_t 
         if (pass == 0 || power == map.by.power) tried.push_back({weight * unit, soft, power});
       };
       for (const double weight : {0.6, 1.8, 5.4}) {
-        try_it(weight, 0.004, 1);
-        try_it(weight, 0.01, 0.3);
-        if (pass == 0) try_it(weight, 0.04, 1);
+        try_it(weight, kSoftFine, 1);
+        try_it(weight, kSoftUsual, kPowerOfSteps);
+        if (pass == 0) try_it(weight, kSoftCoarse, 1);
       }
       const double gain = choose(folds, all, tried, fitter.threads(), map);
       if (pass == 0 && gain < kLeastMapEvidence) return;

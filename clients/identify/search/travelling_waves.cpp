@@ -210,7 +210,7 @@ bool stand_still(const Fitter& fitter, FitState& state, std::size_t place, doubl
   FitState trial = state;
   Term& term = trial.model.terms[place];
   wave_of(term)->points[2] = 0;
-  term.name = "speed-by-position";
+  term.name = effect_name(kSpeed, "position");
   if (!(fitter.fit_for_likelihood(trial, 2) > likelihood - kMostLost)) return false;
   state = std::move(trial);
   return true;

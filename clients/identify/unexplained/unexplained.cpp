@@ -8,12 +8,12 @@
 #include <map>
 #include <utility>
 
+#include "clients/identify/result/large_error.hpp"
+#include "core/stats/quantiles.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
-/// Least ratio of an error to the model's own expectation or to repetitions that counts as large. Both are estimates
-/// without an interval of their own.
-constexpr double kBeyond = 1.15;
 /// Least share of a pattern that is shown, and the most patterns.
 constexpr double kShown = 0.02;
 constexpr std::size_t kMostPatterns = 6;
@@ -57,8 +57,9 @@ Gap largest_gap(const Unexplained& u, const std::vector<Comparison>& comparisons
   for (const Comparison& c : comparisons) {
     // If something is learned, the error of these robots is systematic. Its size then needs no interval over other robots.
     const auto beyond = [&](double floor_mm) {
-      return (c.interval && c.interval->low_mm > kBeyond * floor_mm) ||
-             (learned_mm > 0 && !u.learner->cross_validated && u.learner->error_low_mm > kBeyond * floor_mm);
+      return (c.interval && c.interval->low_mm > kLargeErrorRatio * floor_mm) ||
+             (learned_mm > 0 && !u.learner->cross_validated &&
+              u.learner->error_low_mm > kLargeErrorRatio * floor_mm);
     };
     const auto above = [&](double floor_mm) {
       return std::sqrt(std::max(0.0, c.error_mm * c.error_mm - floor_mm * floor_mm));
@@ -89,8 +90,8 @@ std::string words_of(const Pattern& p) {
 /// none.
 const Comparison* exceeding(const Unexplained& u, const std::vector<Comparison>& comparisons) {
   const auto found = std::find_if(comparisons.begin(), comparisons.end(), [&](const Comparison& c) {
-    return (c.expected_mm > 0 && c.error_mm > kBeyond * c.expected_mm) ||
-           (u.repetitions_mm && c.error_mm > kBeyond * *u.repetitions_mm);
+    return (c.expected_mm > 0 && c.error_mm > kLargeErrorRatio * c.expected_mm) ||
+           (u.repetitions_mm && c.error_mm > kLargeErrorRatio * *u.repetitions_mm);
   });
   return found == comparisons.end() ? nullptr : &*found;
 }
@@ -104,7 +105,7 @@ std::string comparison_in_words(const Unexplained& u, const Comparison* exceeds)
                                          : "is compared with no expectation of the model.");
   const Comparison& c = *exceeds;
   const std::string exceeded =
-      c.expected_mm > 0 && c.error_mm > kBeyond * c.expected_mm
+      c.expected_mm > 0 && c.error_mm > kLargeErrorRatio * c.expected_mm
           ? fmt::format("exceeds the {:.2f} mm that the model expects", c.expected_mm)
           : fmt::format("exceeds the {:.2f} mm by which repetitions of the same commands differ",
                         *u.repetitions_mm);
@@ -133,13 +134,16 @@ std::string odd_robot_in_words(const MeasuredSet& set, const PredictionErrors& e
     sum.rows += part.rows;
   }
   if (robots.size() < kFewestRobots) return {};
-  std::vector<std::pair<double, std::uint32_t>> by_error;
-  for (const auto& [robot, part] : robots)
-    if (part.rows > 0) by_error.emplace_back(std::sqrt(part.sum_mm2 / static_cast<double>(part.rows)), robot);
-  if (by_error.empty()) return {};
-  std::sort(by_error.begin(), by_error.end());
-  const double median_mm = by_error[by_error.size() / 2].first;
-  const auto& [largest_mm, robot] = by_error.back();
+  std::vector<double> errors_mm;
+  std::pair<double, std::uint32_t> largest{-1, 0};
+  for (const auto& [robot, part] : robots) {
+    if (part.rows == 0) continue;
+    errors_mm.push_back(std::sqrt(part.sum_mm2 / static_cast<double>(part.rows)));
+    largest = std::max(largest, {errors_mm.back(), robot});
+  }
+  if (errors_mm.empty()) return {};
+  const double median_mm = stats::upper_median(errors_mm);
+  const auto& [largest_mm, robot] = largest;
   if (!(largest_mm > kOdd * median_mm)) return {};
   return fmt::format(" Robot {} has an error of {:.2f} mm, {:.1f} times the median of the robots.", robot,
                      largest_mm, largest_mm / median_mm);
@@ -163,7 +167,7 @@ std::string words_of(const Unexplained& u, const Gap& gap, const Comparison* exc
 bool leaves_systematic_error(const MeasuredSet& set, const std::vector<Window>& known,
                              const PredictionErrors& errors, std::uint32_t threads) {
   if (errors.rows == 0) return false;
-  if (errors.rmse_mm() > kBeyond * errors.expected_mm()) return true;
+  if (errors.rmse_mm() > kLargeErrorRatio * errors.expected_mm()) return true;
   const std::optional<LearnerCheck> learner = learner_check(set, known, {}, threads);
   return learner && learner->predicted_mm() > 0;
 }

@@ -57,10 +57,24 @@ TEST(Plausible, WrongUnitsAreReported) {
   says([](Sample& s) { s.time_s += 1.7e9; }, "not since 1970");
   says([](Sample& s) { s.time_s *= 1000; }, "not milliseconds");
   says([](Sample& s) { s.x_mm /= 1000, s.y_mm /= 1000; }, "not metres");
+  says([](Sample& s) { s.x_mm /= 300, s.y_mm /= 10; }, "not centimetres");
   says([](Sample& s) { s.x_mm *= 40, s.y_mm *= 40; }, "not pixels");
   says([](Sample& s) { s.x_mm = 1e300; }, "give mm");
   says([](Sample& s) { s.heading_rad = s.heading_rad * 180 / M_PI + 180; }, "not degrees");
   says([](Sample& s) { s.x_mm = 300 * std::round(s.x_mm / 300), s.y_mm = 0; }, "commanded robots drive");
+}
+
+TEST(Plausible, HeadingsThatAreNotThoseOfTheMotionAreReported) {
+  const auto says = [](const std::function<void(Sample&)>& change, const char* what) {
+    const std::string text = complaint(change);
+    EXPECT_NE(text.find(what), std::string::npos) << text;
+  };
+  says([](Sample& s) { s.heading_rad = -s.heading_rad; }, "(their negatives)");
+  says([](Sample& s) { s.heading_rad += M_PI / 2; }, "90 degrees to the left");
+  says([](Sample& s) { s.heading_rad -= 2; }, "115 degrees to the right");
+  // A marker that is turned a little, and headings that say nothing.
+  EXPECT_EQ(complaint([](Sample& s) { s.heading_rad += 0.8; }), "");
+  EXPECT_EQ(complaint([](Sample& s) { s.heading_rad = s.time_s * s.time_s; }), "");
 }
 
 TEST(Plausible, AxesOfAPictureAreReported) {

@@ -53,7 +53,9 @@ TEST_F(ValidateEffects, ADirectionGoesWithPlacesAlongIt) {
 TEST_F(ValidateEffects, EpisodesNeedRateAndLength) {
   const std::string head =
       kRobots + "effect { name: 'a' acts_on: WHEEL_GAIN function { constant: -1 }\n function { ";
-  EXPECT_EQ(check_error(head + "episodes { mean_apart_s: 100 scale_s: 5 tail: 1.5 } } }"), "");
+  EXPECT_EQ(check_error(head + "episodes { mean_apart_s: 100 scale_s: 5 tail: 1.5 shape: 3 } } }"), "");
+  EXPECT_EQ(check_error(head + "episodes { mean_apart_s: 100 scale_s: 5 shape: 0 } } }"),
+            "e.txtpb:3:53: shape is 0; it takes a number, 0.1..100");
   EXPECT_EQ(check_error(head + "episodes { scale_s: 5 } } }"),
             "e.txtpb:3:13: mean_apart_s is missing; state the mean time from the end of an episode to the next");
   EXPECT_EQ(check_error(head + "episodes { mean_apart_s: 5 } } }"),

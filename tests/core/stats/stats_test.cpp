@@ -84,6 +84,18 @@ TEST(Distributions, TheLogarithmOfATailIsExactOnBothSides) {
   EXPECT_NEAR(log10_chi_squared_tail(4000, 2), -2000 / std::log(10.0), 1e-9);
 }
 
+TEST(Gumbel, QuantilesFollowFromTheMoments) {
+  EXPECT_NEAR(kGumbelSd * std::sqrt(6.0), M_PI, 1e-15);
+  // With location 3 and scale 2: the mean is 3 + 2 * Euler's constant, and P(X <= x) = exp(-exp(-(x - 3) / 2)).
+  constexpr double kLocation = 3, kScale = 2, kMean = kLocation + kScale * 0.57721566490153286;
+  for (const double p : {0.003, 0.5, 0.95, 0.997}) {
+    const double x = gumbel_quantile(p, kMean, kScale * kGumbelSd);
+    EXPECT_NEAR(std::exp(-std::exp(-(x - kLocation) / kScale)), p, 1e-12);
+  }
+  // The median of the standard distribution is -log(log 2).
+  EXPECT_NEAR(gumbel_quantile(0.5, 0.57721566490153286, kGumbelSd), -std::log(std::log(2.0)), 1e-14);
+}
+
 TEST(WilsonInterval, HoldsTheProbabilityAsOftenAsStated) {
   // Exact coverage over the binomial distribution.
   constexpr int kTrials = 100;

@@ -315,16 +315,24 @@ TEST(Effects, PlacesAlongADirectionMatchTheirDefinition) {
   }
 }
 
-TEST(Effects, EpisodesHaveTheStatedRateAndDuration) {
-  // 200 robots for 1000 s: mean interval 8 s, mean duration 4 / (3 - 1) s, so an episode is on for a fifth of the time.
+class EpisodesOfShape : public ::testing::TestWithParam<int> {};
+
+INSTANTIATE_TEST_SUITE_P(LomaxAndBurr, EpisodesOfShape, ::testing::Values(1, 3));
+
+TEST_P(EpisodesOfShape, HaveTheStatedRateAndDuration) {
+  // 200 robots for 1000 s.
   constexpr std::uint32_t kRobots = 200;
   constexpr int kTicks = 30518;
-  const double mean_apart_s = 8, scale_s = 4, tail = 3;
+  const double mean_apart_s = 8, scale_s = 4, tail = 3, shape = GetParam();
+  // A shape of 1: scale / (tail - 1).
+  const double mean_length_s =
+      scale_s * std::tgamma(tail - 1 / shape) * std::tgamma(1 + 1 / shape) / std::tgamma(tail);
   std::vector<ScenePose> poses;
   for (std::uint32_t r = 0; r < kRobots; ++r) poses.push_back({0, 40.0 * r - 4000, 0});
-  const RunPlan plan = make_plan(
-      shown("episodes { mean_apart_s: 8 scale_s: 4 tail: 3 }", "duration_s: 1000 physics { engine: KINEMATIC } "),
-      poses);
+  const RunPlan plan =
+      make_plan(shown("episodes { mean_apart_s: 8 scale_s: 4 tail: 3 shape: " + std::to_string(GetParam()) + " }",
+                      "duration_s: 1000 physics { engine: KINEMATIC } "),
+                poses);
   Swarm swarm(plan);
   std::vector<double> last_x(kRobots, 0), began(kRobots, -1), lengths, waits, ended(kRobots, -1);
   double on = 0;
@@ -355,15 +363,14 @@ TEST(Effects, EpisodesHaveTheStatedRateAndDuration) {
   ASSERT_GT(lengths.size(), 15000u);
   // Three standard errors, plus a tick for phases rounded up to one; the run's end cuts long phases.
   EXPECT_NEAR(mean(waits), mean_apart_s, 3 * mean_apart_s / std::sqrt(waits.size()) + kTick_s + 0.1);
-  EXPECT_NEAR(mean(lengths), scale_s / (tail - 1), 3 * 3.5 / std::sqrt(lengths.size()) + kTick_s);
-  EXPECT_NEAR(on / kTicks / kRobots, 0.2, 0.01);
+  EXPECT_NEAR(mean(lengths), mean_length_s, 3 * 3.5 / std::sqrt(lengths.size()) + kTick_s);
+  EXPECT_NEAR(on / kTicks / kRobots, mean_length_s / (mean_length_s + mean_apart_s), 0.01);
   for (const double t : {2.0, 8.0, 20.0}) {
-    const double share = std::pow(1 + t / scale_s, -tail), n = static_cast<double>(lengths.size());
+    const double grown = std::pow(t / scale_s, shape), share = std::pow(1 + grown, -tail),
+                 density = tail * shape / t * grown * share / (1 + grown), n = static_cast<double>(lengths.size());
     const double longer =
         static_cast<double>(std::count_if(lengths.begin(), lengths.end(), [t](double l) { return l > t; }));
-    EXPECT_NEAR(longer / n, share,
-                3 * std::sqrt(share * (1 - share) / n) + 0.01 * share + kTick_s * tail * share / (scale_s + t))
-        << t;
+    EXPECT_NEAR(longer / n, share, 3 * std::sqrt(share * (1 - share) / n) + 0.01 * share + kTick_s * density) << t;
   }
 }
 
