@@ -69,6 +69,19 @@ double fitted_speed(const SpellScan& scan, const MotionModel& model, Stalls stal
   return best > 0 && value(0) > gain - kClear ? 0 : best;
 }
 
+/// 95 % interval of the speed within spells, by the second difference of the likelihood.
+std::pair<double, double> speed_interval(const SpellScan& scan, const MotionModel& model, Stalls stalls) {
+  constexpr double kStep = 0.05, kLeastCurvature = 1e-3;
+  const double speed = stalls.gain;
+  const auto value = [&](double at) {
+    stalls.gain = at;
+    return scan.scan(model, stalls).gain;
+  };
+  const double fall = 2 * value(speed) - value(speed - kStep) - value(speed + kStep);
+  const double half = stats::kNormal95 * kStep / std::sqrt(std::max(fall, kLeastCurvature));
+  return {std::max(0.0, speed - half), std::min(1.0, speed + half)};
+}
+
 /// Refits everything beside the spells.
 SpellScan::Found refit(const SpellScan& scan, const Fitter& fitter, SpellScan::Found found, FitState& state) {
   constexpr int kRounds = 2;
@@ -137,12 +150,32 @@ std::optional<StallEffect> find_stalls(const Fitter& fitter, FitState& state) {
   if (out.spells < kFewestSpells || !(out.log10_p < kStallThreshold_log10_p) || !(out.held_out > kLeastStallGain) ||
       !(out.held_out > kLeastStallErrors * out.held_out_se))
     return std::nullopt;
+  const SpellScan::Intervals intervals = scan.intervals(found, out.stalls);
+  out.mean_apart_s = intervals.mean_apart_s;
+  out.mean_length_s = intervals.mean_length_s;
+  if (out.stalls.gain > 0) out.speed = speed_interval(scan, trial.model, out.stalls);
   std::vector<std::vector<float>> shares;
   for (const TrackSpells& track : found.tracks) shares.push_back(track.share);
   trial.tracks.set_spells(std::move(shares));
   state = std::move(trial);
   return out;
 }
+
+namespace {
+
+identification::Estimate number_of(const char* name, const char* unit, double value,
+                                   const std::pair<double, double>& interval, const char* how) {
+  identification::Estimate out;
+  out.set_name(name);
+  out.set_unit(unit);
+  out.set_value(value);
+  out.set_low(interval.first);
+  if (std::isfinite(interval.second)) out.set_high(interval.second);
+  out.set_how(how);
+  return out;
+}
+
+}  // namespace
 
 identification::Effect entry_of(const StallEffect& found) {
   const Stalls& stalls = found.stalls;
@@ -167,6 +200,13 @@ identification::Effect entry_of(const StallEffect& found) {
   parameters["mean_length_s"] = json_value(stalls.mean_length_s());
   parameters["share_of_time"] = json_value(stalls.share());
   parameters["speed"] = json_value(stalls.gain);
+  *out.add_numbers() = number_of("mean time from one spell to the next", "s", stalls.mean_apart_s,
+                                 found.mean_apart_s, "number of spells found, a Poisson variable");
+  *out.add_numbers() = number_of("mean duration", "s", stalls.mean_length_s(), found.mean_length_s,
+                                 "posterior distribution of the law of the durations");
+  if (found.speed)
+    *out.add_numbers() = number_of("speed within spells", "", stalls.gain, *found.speed,
+                                   "curvature of the likelihood, all else as fitted");
   *out.mutable_rmse_without_mm() = json_null();
   *out.mutable_share_removed() = json_null();
   const std::string in_scales = fmt::format("t / {:.1f} s", stalls.scale_s);

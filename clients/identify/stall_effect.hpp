@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "clients/identify/fit/fitter.hpp"
 #include "idl/identification.pb.h"
@@ -22,6 +23,9 @@ struct StallEffect {
   double gain = 0;            ///< of the log likelihood, nat
   double held_out = 0,
          held_out_se = 0;  ///< the same in cross-validation over robots, and its standard error over tracks
+  /// 95 % intervals. Of the speed: by the curvature of the likelihood; nothing for robots that stand still.
+  std::pair<double, double> mean_apart_s, mean_length_s;
+  std::optional<std::pair<double, double>> speed;
 };
 
 /// Stalls in the tracks of the fit, if they pass. The state then holds them, with everything else refitted beside them.

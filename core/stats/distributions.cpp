@@ -36,4 +36,9 @@ double student_quantile(double p, double degrees) {
   return boost::math::quantile(boost::math::students_t(degrees), p);
 }
 
+std::pair<double, double> poisson_interval(double count) {
+  constexpr double kBelow = 0.025;
+  return {count > 0 ? boost::math::gamma_p_inv(count, kBelow) : 0, boost::math::gamma_q_inv(count + 1, kBelow)};
+}
+
 }  // namespace kilotwin::stats

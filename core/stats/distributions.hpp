@@ -33,6 +33,9 @@ inline constexpr double kGumbelSd = 1.28254983016186409554;  // pi / sqrt(6)
   return mean + standard_deviation * (-std::log(-std::log(p)) - std::numbers::egamma) / kGumbelSd;
 }
 
+/// 95 % interval of the mean of a Poisson distribution of which one variable is `count` (Garwood 1936). count >= 0.
+[[nodiscard]] std::pair<double, double> poisson_interval(double count);
+
 /// 95 % interval of a probability of which `hits` of `trials` independent trials tell (Wilson 1927). trials > 0.
 [[nodiscard]] inline std::pair<double, double> wilson_interval(double hits, double trials) {
   const double share = hits / trials, z2 = kNormal95 * kNormal95 / trials;

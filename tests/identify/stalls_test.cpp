@@ -97,6 +97,25 @@ TEST_P(StallsOfShape, DurationsAreFittedWithCensoring) {
   for (const double t : {0.5, 2.0, 5.0}) EXPECT_NEAR(fitted.survival(t), truth.survival(t), 0.03);
 }
 
+TEST_P(StallsOfShape, IntervalsOfTheMeanDurationHoldIt) {
+  Stalls truth = of_shape(GetParam());
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<double> uniform(1e-12, 1);
+  constexpr double kLeast_s = 0.25;
+  constexpr int kSets = 60, kSpells = 60;
+  int holds = 0;
+  for (int k = 0; k < kSets; ++k) {
+    std::vector<Spell> spells;
+    while (spells.size() < kSpells)
+      if (const double length_s = truth.length_s(uniform(random)); length_s > kLeast_s)
+        spells.push_back({0, length_s, false});
+    const auto [low, high] = mean_length_interval_s(spells, kLeast_s, truth);
+    holds += low <= truth.mean_length_s() && truth.mean_length_s() <= high ? 1 : 0;
+  }
+  // 57 are expected; below 52 with a probability of 1 %.
+  EXPECT_GE(holds, 52);
+}
+
 /// A base model fitted to a scene, and the stalls that are found beside it.
 struct WithStalls : BaseFit {
   explicit WithStalls(const truth::Scene& scene, std::uint64_t seed = 5) : BaseFit(scene, seed) {
@@ -117,6 +136,11 @@ TEST(Stalls, AreFoundWithTheirParametersAndWritten) {
   EXPECT_NEAR(stalls.mean_apart_s, 30, 6);
   EXPECT_NEAR(stalls.mean_length_s(), 4, 1.2);
   EXPECT_GT(f.found->held_out, 100);
+  EXPECT_LT(f.found->mean_apart_s.first, stalls.mean_apart_s);
+  EXPECT_GT(f.found->mean_apart_s.second, stalls.mean_apart_s);
+  EXPECT_LT(f.found->mean_length_s.first, 4);
+  EXPECT_GT(f.found->mean_length_s.second, 4);
+  EXPECT_FALSE(f.found->speed);
   // The noise and the speeds are those beside the spells. With a spell every 30 s the noise keeps a remainder.
   const double truth_s = scene.factor_sd * scene.factor_sd * scene.step_s;
   EXPECT_LT(f.state.model.noise.factor_s, 2 * truth_s);
@@ -141,6 +165,10 @@ TEST(Stalls, SlipsHaveASpeed) {
   const WithStalls f(small({truth::rare_spells({30, 9, 3, 0.4})}));
   ASSERT_TRUE(f.found);
   EXPECT_NEAR(f.found->stalls.gain, 0.4, 0.1);
+  ASSERT_TRUE(f.found->speed);
+  EXPECT_LT(f.found->speed->first, 0.4);
+  EXPECT_GT(f.found->speed->second, 0.4);
+  EXPECT_LT(f.found->speed->second - f.found->speed->first, 0.2);
 }
 
 /// The probability that a robot is in a spell, by its motion up to the time.

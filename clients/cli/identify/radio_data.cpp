@@ -79,6 +79,23 @@ identification::Table table_of_population(const identification::RadioFit& fit) {
   return table;
 }
 
+/// Numbers of the population with their 95 % intervals.
+identification::Table table_of_numbers(const identification::RadioFit& fit) {
+  identification::Table table;
+  table.set_id("numbers");
+  table.set_title("Numbers of the population");
+  table.set_lead(
+      "Of the model for robots like these. Range and pattern are told apart by their priors where bearings are "
+      "few.");
+  identify::assign(table.mutable_head(), std::array{"number", "value", "95 % interval", "by"});
+  for (const identification::Estimate& number : fit.shared().numbers())
+    *table.add_rows() = json_list(std::array{
+        number.name(), fmt::format("{:.2f} {}", number.value(), number.unit()),
+        number.has_high() ? fmt::format("{:.2f} to {:.2f} {}", number.low(), number.high(), number.unit()) : "",
+        number.how()});
+  return table;
+}
+
 /// An effect with its gain over the step before it.
 identification::Effect effect_of(const RadioStep& step, const RadioStep& before) {
   const double deficit_before = mean_of(before, &RadioErrors::deficit),
@@ -165,6 +182,7 @@ identify::Identified identify_radio_runs(const fs::path& train, const fs::path& 
   *result.found.mutable_result() = result_of(fitted.fit);
   add_words(result.found);
   *result.found.add_tables() = table_of_errors(fitted.fit);
+  *result.found.add_tables() = table_of_numbers(fitted.fit);
   *result.found.add_tables() = table_of_population(fitted.fit);
   result.found.mutable_set()->set_has_headings(false);
   result.found.mutable_set()->set_has_commands(false);

@@ -7,6 +7,7 @@
 
 #include "clients/identify/fit/likelihood.hpp"
 #include "core/os/worker_pool.hpp"
+#include "core/stats/distributions.hpp"
 #include "core/stats/quantiles.hpp"
 
 namespace kilotwin::identify {
@@ -49,24 +50,36 @@ SpellScan::Found SpellScan::scan(const MotionModel& model, const Stalls& stalls)
   return scan(model, [&](std::size_t) { return stalls; });
 }
 
-Stalls SpellScan::refined(const Found& found, Stalls stalls, const std::function<bool(std::size_t)>& use) const {
-  std::vector<Spell> spells;
-  double between_s = 0, starts = 0;
+SpellScan::Shown SpellScan::shown_by(const Found& found, const std::function<bool(std::size_t)>& use) const {
+  Shown out;
   for (std::size_t v = 0; v < found.tracks.size(); ++v) {
     if (!use(v)) continue;
-    between_s += found.tracks[v].between_s;
+    out.between_s += found.tracks[v].between_s;
     for (const Spell& spell : found.tracks[v].spells) {
-      spells.push_back(spell);
-      starts += spell.start_s > views_[v].track->samples.front().time_s ? 1 : 0;
+      out.spells.push_back(spell);
+      out.starts += spell.start_s > views_[v].track->samples.front().time_s ? 1 : 0;
     }
   }
+  return out;
+}
+
+Stalls SpellScan::refined(const Found& found, Stalls stalls, const std::function<bool(std::size_t)>& use) const {
+  const Shown shown = shown_by(found, use);
   // Beyond what any track shows.
   stalls.longest_s = 2 * longest_s_;
-  fit_lengths(spells, least_s_, stalls);
+  fit_lengths(shown.spells, least_s_, stalls);
   // Short spells are not seen.
-  if (between_s > 0)
-    stalls.mean_apart_s = std::max(1.0, between_s * stalls.survival(least_s_) / std::max(starts, 0.5));
+  if (shown.between_s > 0)
+    stalls.mean_apart_s = std::max(1.0, shown.between_s * stalls.survival(least_s_) / std::max(shown.starts, 0.5));
   return stalls;
+}
+
+SpellScan::Intervals SpellScan::intervals(const Found& found, const Stalls& stalls) const {
+  const Shown shown = shown_by(found, [](std::size_t) { return true; });
+  const double seen_s = shown.between_s * stalls.survival(least_s_);
+  const auto [fewest, most] = stats::poisson_interval(shown.starts);
+  return {{seen_s / most, fewest > 0 ? seen_s / fewest : INFINITY},
+          mean_length_interval_s(shown.spells, least_s_, stalls)};
 }
 
 Stalls SpellScan::refined(const Found& found, const Stalls& stalls) const {

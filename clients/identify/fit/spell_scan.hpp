@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "clients/identify/fit/fit_state.hpp"
@@ -28,6 +29,12 @@ class SpellScan {
   /// The parameters of maximum likelihood by the spells of the views that `use` picks.
   [[nodiscard]] Stalls refined(const Found&, Stalls, const std::function<bool(std::size_t)>& use) const;
   [[nodiscard]] Stalls refined(const Found&, const Stalls&) const;
+  /// 95 % intervals, given the spells found: of the mean time apart by their number, a Poisson variable; of the mean duration by their
+  /// durations.
+  struct Intervals {
+    std::pair<double, double> mean_apart_s, mean_length_s;
+  };
+  [[nodiscard]] Intervals intervals(const Found&, const Stalls&) const;
   /// Mean square deviation of the number of robots in a spell from its mean, over that of independent robots with the same share of
   /// time in spells: 1 for independent robots, up to their number if all stall together. Without two robots in a run: 1.
   [[nodiscard]] double dispersion(const Found&) const;
@@ -37,6 +44,13 @@ class SpellScan {
   [[nodiscard]] const std::vector<TrackView>& views() const { return views_; }
 
  private:
+  /// What the views that `use` picks show of the law of the spells.
+  struct Shown {
+    std::vector<Spell> spells;
+    double between_s = 0, starts = 0;
+  };
+  [[nodiscard]] Shown shown_by(const Found&, const std::function<bool(std::size_t)>& use) const;
+
   const std::vector<TrackView> views_;
   const std::uint32_t threads_;
   std::vector<double> plain_;  ///< log likelihood without spells, by view

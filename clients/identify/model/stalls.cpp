@@ -50,6 +50,27 @@ double log_posterior(const std::vector<Spell>& spells, double least_s, const Sta
          0.5 * std::pow(std::log(stalls.shape) / kShape_sd, 2);
 }
 
+/// Calls each(law, log posterior) for laws of the durations on a grid that is even in the logarithms of scale, tail and shape.
+template <class Each>
+void for_each_law(const std::vector<Spell>& spells, double least_s, const Stalls& stalls, Each&& each) {
+  constexpr double kLeast_s = 0.3, kMost_s = 100, kLeastTail = 1.2, kMostTail = 12, kLeastShape = 1, kMostShape = 8;
+  constexpr int kScales = 60, kTails = 40, kShapes = 7;
+  const auto on_grid = [](double least, double most, int i, int count) {
+    return least * std::pow(most / least, static_cast<double>(i) / (count - 1));
+  };
+  Stalls law = stalls;
+  for (int k = 0; k < kShapes; ++k) {
+    law.shape = on_grid(kLeastShape, kMostShape, k, kShapes);
+    for (int i = 0; i < kScales; ++i) {
+      law.scale_s = on_grid(kLeast_s, kMost_s, i, kScales);
+      for (int j = 0; j < kTails; ++j) {
+        law.tail = on_grid(kLeastTail, kMostTail, j, kTails);
+        each(law, log_posterior(spells, least_s, law));
+      }
+    }
+  }
+}
+
 }  // namespace
 
 double Stalls::survival(double t_s) const {
@@ -99,31 +120,40 @@ double Stalls::variance_s(double over_s) const {
 }
 
 void fit_lengths(const std::vector<Spell>& spells, double least_s, Stalls& stalls) {
-  constexpr double kLeast_s = 0.3, kMost_s = 100, kLeastTail = 1.2, kMostTail = 12, kLeastShape = 1, kMostShape = 8;
-  constexpr int kScales = 60, kTails = 40, kShapes = 7;
   /// Another shape has to make the durations this much more likely, nat.
   constexpr double kShapeGain = 2;
-  const auto on_grid = [](double least, double most, int i, int count) {
-    return least * std::pow(most / least, static_cast<double>(i) / (count - 1));
-  };
   double best = -std::numeric_limits<double>::infinity();
-  Stalls trial = stalls;
-  for (int k = 0; k < kShapes; ++k) {
-    trial.shape = on_grid(kLeastShape, kMostShape, k, kShapes);
-    for (int i = 0; i < kScales; ++i) {
-      trial.scale_s = on_grid(kLeast_s, kMost_s, i, kScales);
-      for (int j = 0; j < kTails; ++j) {
-        trial.tail = on_grid(kLeastTail, kMostTail, j, kTails);
-        const double value = log_posterior(spells, least_s, trial);
-        if (!(value > best)) continue;
-        best = value;
-        stalls.scale_s = trial.scale_s;
-        stalls.tail = trial.tail;
-        stalls.shape = trial.shape;
-      }
-    }
-    if (k == 0) best += kShapeGain;
+  for_each_law(spells, least_s, stalls, [&](const Stalls& law, double value) {
+    if (!(value - (law.shape == 1 ? 0 : kShapeGain) > best)) return;
+    best = value - (law.shape == 1 ? 0 : kShapeGain);
+    stalls.scale_s = law.scale_s;
+    stalls.tail = law.tail;
+    stalls.shape = law.shape;
+  });
+}
+
+std::pair<double, double> mean_length_interval_s(const std::vector<Spell>& spells, double least_s,
+                                                 const Stalls& stalls) {
+  constexpr double kTail = 0.025, kNegligible = 30;
+  std::vector<std::pair<double, double>> means;  // with their log posterior
+  double best = -std::numeric_limits<double>::infinity(), all = 0;
+  for_each_law(spells, least_s, stalls, [&](const Stalls&, double value) { best = std::max(best, value); });
+  for_each_law(spells, least_s, stalls, [&](const Stalls& law, double value) {
+    if (!(value > best - kNegligible)) return;
+    means.emplace_back(law.mean_length_s(), std::exp(value - best));
+    all += means.back().second;
+  });
+  std::sort(means.begin(), means.end());
+  std::pair<double, double> out{means.front().first, means.back().first};
+  double below = 0;
+  for (const auto& [mean_s, weight] : means) {
+    if (below <= kTail * all) out.first = mean_s;
+    below += weight;
+    if (below < (1 - kTail) * all) continue;
+    out.second = mean_s;
+    break;
   }
+  return out;
 }
 
 }  // namespace kilotwin::identify

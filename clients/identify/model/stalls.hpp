@@ -3,6 +3,7 @@
 /// distribution (Lomax for a shape of 1).
 #pragma once
 
+#include <utility>
 #include <vector>
 
 namespace kilotwin::identify {
@@ -38,5 +39,8 @@ struct Stalls {
 
 /// Scale, tail and shape of maximum likelihood, with a weak prior. Spells shorter than `least_s` are not seen.
 void fit_lengths(const std::vector<Spell>&, double least_s, Stalls&);
+/// 95 % interval of the mean duration, s: of its posterior distribution, with the same prior. Of the stalls, `longest_s` counts.
+[[nodiscard]] std::pair<double, double> mean_length_interval_s(const std::vector<Spell>&, double least_s,
+                                                               const Stalls&);
 
 }  // namespace kilotwin::identify

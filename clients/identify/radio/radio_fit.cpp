@@ -11,12 +11,14 @@
 #include "clients/identify/radio/evidence.hpp"
 #include "clients/identify/radio/grid_run.hpp"
 #include "clients/identify/radio/link_fit.hpp"
+#include "clients/identify/radio/link_intervals.hpp"
 #include "clients/identify/radio/scores.hpp"
 #include "clients/identify/result/result_json.hpp"
 #include "clients/identify/result/values.hpp"
 #include "clients/report/plot.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
+#include "core/os/worker_pool.hpp"
 #include "core/random/random.hpp"
 #include "core/stats/moments.hpp"
 #include "core/stats/quantiles.hpp"
@@ -499,6 +501,8 @@ identification::RadioFit Loop::result() const {
     (*out.mutable_measured_sent())[test_[q].name] = statistics(test_[q]).sent;
   }
   *out.mutable_shared() = entry_of(model_, timing_);
+  for (const identification::Estimate& number : numbers_of(model_, train_, os::cores()))
+    *out.mutable_shared()->add_numbers() = number;
   identification::RadioSets& sets = *out.mutable_of_each_set();
   sets.set_correlation_of_power(same_robots(model_, true));
   sets.set_correlation_of_sensitivity(same_robots(model_, false));

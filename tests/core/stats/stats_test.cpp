@@ -113,5 +113,21 @@ TEST(WilsonInterval, HoldsTheProbabilityAsOftenAsStated) {
   EXPECT_EQ(wilson_interval(50, 50).second, 1);
 }
 
+TEST(PoissonInterval, HoldsTheMeanInAtLeast95PercentOfCases) {
+  for (const double mean : {0.5, 3.0, 10.0, 60.0}) {
+    double probability = std::exp(-mean), holds = 0;
+    for (int count = 0; count < 300; ++count) {
+      const auto [low, high] = poisson_interval(count);
+      if (low <= mean && mean <= high) holds += probability;
+      probability *= mean / (count + 1);
+    }
+    EXPECT_GT(holds, 0.95) << mean;
+    EXPECT_LT(holds, 0.99) << mean;
+  }
+  EXPECT_NEAR(poisson_interval(10).first, 4.795, 1e-3);
+  EXPECT_NEAR(poisson_interval(10).second, 18.390, 1e-3);
+  EXPECT_EQ(poisson_interval(0).first, 0);
+}
+
 }  // namespace
 }  // namespace kilotwin::stats

@@ -349,7 +349,9 @@ Effect rare_spells(RareSpells spells) {
               },
           .see = {},
           .noise = {},
-          .by_chance = true};
+          .by_chance = true,
+          .numbers = {{"mean time from one spell to the next", spells.mean_apart_s},
+                      {"mean duration", spells.scale_s / (spells.tail - 1)}}};
 }
 
 Effect heavy_tailed_noise() {

@@ -8,8 +8,10 @@
 
 #include "clients/identify/radio/grid_run.hpp"
 #include "clients/identify/radio/link_fit.hpp"
+#include "clients/identify/radio/link_intervals.hpp"
 #include "clients/identify/radio/scores.hpp"
 #include "core/base/error.hpp"
+#include "core/random/random.hpp"
 
 namespace kilotwin::radio_fit {
 namespace {
@@ -111,6 +113,45 @@ TEST(LinkFit, RecoversItsParameters) {
   EXPECT_NEAR(sum / links, 0, 0.5);
   EXPECT_LT(found.swarms[0].sensitivity_db(4), -1.2);
   EXPECT_LT(found.swarms[0].sensitivity_db(4), found.swarms[0].power_db.minCoeff() - 0.5);
+}
+
+TEST(LinkIntervals, HoldTheSpreadOfRobots) {
+  proto::Radio radio;
+  radio.set_model(proto::Radio::PROPAGATION);
+  radio.set_range_mm(128);
+  proto::Propagation& model = *radio.mutable_propagation();
+  model.set_power_sd_db(0);
+  model.set_sensitivity_sd_db(0);
+  model.set_power_bearing_sd_db(0);
+  model.set_sensitivity_bearing_sd_db(0);
+  model.set_pair_sd_db(0);
+  model.set_link_sd_db(0);
+  model.set_run_sd_db(0.8);
+  constexpr std::uint64_t kSets = 8;
+  int holds = 0;
+  for (std::uint64_t k = 0; k < kSets; ++k) {
+    // The same robots in all runs of a set.
+    const Random random(k + 1);
+    model.clear_robot();
+    for (std::uint32_t r = 0; r < 16; ++r) {
+      proto::RobotRadio& robot = *model.add_robot();
+      robot.set_robot(r);
+      robot.set_power_db(0.9 * random.normal(Stream::kLink, r, Tick{0}, 0));
+      robot.set_sensitivity_db(1.1 * random.normal(Stream::kLink, r, Tick{0}, 1));
+    }
+    const std::vector<GridSet> sets{simulate(grid(16, 0, 40), radio, 6, 1 + 100 * k)};
+    for (const identification::Estimate& number : numbers_of(fit_links(sets, Terms::kRobots), sets, 2)) {
+      const double truth = number.name() == "sd of power over robots"         ? 0.9
+                           : number.name() == "sd of sensitivity over robots" ? 1.1
+                                                                              : -1;
+      if (truth < 0) continue;
+      EXPECT_LT(number.low(), number.value());
+      EXPECT_LT(number.high() - number.low(), 3) << "an interval that says something";
+      holds += number.low() <= truth && truth <= number.high() ? 1 : 0;
+    }
+  }
+  // Of 16 intervals 15.2 are expected; fewer than 12 with a probability of 0.1 %.
+  EXPECT_GE(holds, 12);
 }
 
 }  // namespace
