@@ -44,7 +44,7 @@ class SpellScan {
   [[nodiscard]] const std::vector<TrackView>& views() const { return views_; }
 
  private:
-  /// What the views that `use` picks show of the law of the spells.
+  /// Spells and times of the views that `use` picks.
   struct Shown {
     std::vector<Spell> spells;
     double between_s = 0, starts = 0;

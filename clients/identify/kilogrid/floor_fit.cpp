@@ -234,6 +234,35 @@ double fit(FloorModel& model, const FloorTarget& target, int rounds, double widt
   return misfit;
 }
 
+std::vector<double> standard_errors(const FloorModel& model, const FloorTarget& target, std::uint64_t seed) {
+  constexpr double kWidth = 0.5;  // of the last rounds of the fit
+  const Metric metric(target, quick_set(target, model, seed));
+  const FloorStatistics at =
+      simulated_statistics(target, model.settings(), seed * 7 + 2, kQuickRuns, Simulator::kQuick);
+  const std::vector<bool> all(model.values.size(), true);
+  const Eigen::MatrixXd slopes =
+      metric.slopes(at, slopes_around(model, target, all, kWidth, kExplored_s, seed * 10));
+  // Robust weights, as in the fit: statistics that no parameter reaches count less.
+  const Eigen::VectorXd weights = weights_of(metric.off(at)).cwiseProduct(importance());
+  const Eigen::MatrixXd weighted = weights.asDiagonal() * slopes;
+  // Directions of parameters that the statistics do not see have no finite error.
+  constexpr double kSeen = 1e-6;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> bread(slopes.transpose() * weighted);
+  const double least = kSeen * std::max(bread.eigenvalues().maxCoeff(), 1e-300);
+  const Eigen::VectorXd inverse =
+      bread.eigenvalues().unaryExpr([&](double v) { return v > least ? 1 / v : 1 / least; });
+  const Eigen::MatrixXd half =
+      bread.eigenvectors() * inverse.asDiagonal() * bread.eigenvectors().transpose() * weighted.transpose();
+  const std::vector<FloorParameter> parameters = model.parameters();
+  std::vector<double> out;
+  for (std::size_t p = 0; p < parameters.size(); ++p) {
+    const double sd = half.row(static_cast<Eigen::Index>(p)).norm() * kWidth * parameters[p].width;
+    const bool seen = slopes.col(static_cast<Eigen::Index>(p)).squaredNorm() > 0;
+    out.push_back(seen && std::isfinite(sd) ? sd : std::numeric_limits<double>::infinity());
+  }
+  return out;
+}
+
 void fit_from_far_start(FloorModel& model, const FloorTarget& target, std::uint64_t seed,
                         const FloorProgress& progress) {
   // The misfit has several local minima. Slopes over wide steps lead to deep ones; short runs suffice for them.

@@ -16,6 +16,11 @@ using FloorProgress = std::function<void(const std::string&)>;
 /// times. Keeps the best model. Returns its misfit.
 double fit(FloorModel&, const FloorTarget&, int rounds, double width, std::uint64_t seed, const FloorProgress&);
 
+/// Standard errors of all parameters of a fitted model, by the linearised method of moments (Gourieroux, Monfort and Renault, Indirect
+/// inference, 1993): the variances of the statistics between robots and runs, carried through the slopes of the statistics. As if the
+/// statistics were independent in the metric of the fit. Infinite where no statistic depends on the parameter.
+[[nodiscard]] std::vector<double> standard_errors(const FloorModel&, const FloorTarget&, std::uint64_t seed);
+
 /// Initial fit for a start far from the optimum: wide steps with short fast runs.
 void fit_from_far_start(FloorModel&, const FloorTarget&, std::uint64_t seed, const FloorProgress&);
 

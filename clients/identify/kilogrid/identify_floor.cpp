@@ -17,6 +17,7 @@
 #include "clients/identify/kilogrid/floor_validation.hpp"
 #include "clients/identify/result/values.hpp"
 #include "core/base/error.hpp"
+#include "core/stats/distributions.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
@@ -24,6 +25,9 @@ namespace {
 using identify::Identified, identify::Options, identify::assign;
 using JsonFields = google::protobuf::Map<std::string, identify::JsonValue>;
 using identify::json_list, identify::json_null, identify::json_value;
+
+/// Of the simulations that give standard errors.
+constexpr std::uint64_t kErrorsSeed = 500;
 
 std::string words_of(const FloorModel& model, std::size_t term) {
   const double* v = model.values.data() + model.first_of(term);
@@ -180,6 +184,7 @@ class FloorIdentification {
   void add_ambiguities();
   void add_statistics();
   void add_base();
+  [[nodiscard]] identification::Estimate number(std::size_t parameter) const;
 
   const Options& options_;
   const Floor floor_;
@@ -190,6 +195,7 @@ class FloorIdentification {
   const FloorTarget learned_, choosing_, held_out_;
   std::vector<FloorStage> path_;  ///< of the search, base model first
   FloorModel base_, model_;
+  std::vector<double> errors_;  ///< standard errors of the values of model_
   std::vector<EffectGain> gains_;
   std::vector<Predicted> by_base_, by_model_;
   JudgedModel before_ = {}, after_ = {};
@@ -325,6 +331,7 @@ void FloorIdentification::refit() {
     fit(model_, target, 1, 0.5, 400, progress());
   else
     model_ = base_;
+  errors_ = standard_errors(model_, target, kErrorsSeed);
 }
 
 JudgedModel FloorIdentification::judged(const FloorModel& model, std::uint64_t seed,
@@ -346,6 +353,23 @@ void FloorIdentification::add_parameters(std::size_t e, JsonFields& parameters) 
   parameters["form"] = json_value("record of the model");
   for (std::size_t p = 0; p < all.size(); ++p)
     parameters[all[p].name] = json_value(model_.values[model_.first_of(e + 1) + p]);
+}
+
+/// A parameter with its 95 % interval. An interval as wide as the range that the parameter may have says nothing.
+identification::Estimate FloorIdentification::number(std::size_t parameter) const {
+  const FloorParameter of = model_.parameters()[parameter];
+  const double value = model_.values[parameter], half = stats::kNormal95 * errors_[parameter];
+  identification::Estimate out;
+  out.set_name(of.name);
+  out.set_value(value);
+  if (2 * half < of.most - of.least) {
+    out.set_low(std::max(of.least, value - half));
+    out.set_high(std::min(of.most, value + half));
+    out.set_how("linearised method of moments");
+  } else {
+    out.set_how("no interval: these data leave it open");
+  }
+  return out;
 }
 
 identification::Effect FloorIdentification::judged_effect(std::size_t e) {
@@ -379,6 +403,8 @@ identification::Effect FloorIdentification::judged_effect(std::size_t e) {
       json_value(fmt::format("{:.1f} mm without it, {:.1f} mm with it", lesser.rmse_mm(), after_.cells.rmse_mm()));
   facts["likelihood of cells"] = json_value(fmt::format("{:+.0f} nat with it, for single-robot filters", gain_nat));
   effect.set_in_words(is_wall ? words_of_wall(model_) : words_of(model_, e + 1));
+  for (std::size_t p = 0; !is_wall && p < model_.terms[e + 1].parameters.size(); ++p)
+    *effect.add_numbers() = number(model_.first_of(e + 1) + p);
   say(fmt::format("{}: misfit {:.0f} without it, {:.0f} with it", name, misfit, after_.misfit));
   return effect;
 }
@@ -444,6 +470,7 @@ void FloorIdentification::judge(const OpenedDays& record) {
   const OpenedDays::Opened opened =
       record.open(days_.report, days_.searched(),
                   fmt::format("horizon {} s, effects {}", options_.horizon_s, options_.find_effects), today());
+  if (errors_.empty()) errors_ = standard_errors(model_, learned_, kErrorsSeed);
   before_ = judged(base_, 78, by_base_);
   after_ = judged(model_, 79, by_model_);
   for (const auto& [to, of] : {std::pair{out().mutable_before(), &before_}, {out().mutable_after(), &after_}}) {
@@ -501,6 +528,7 @@ void FloorIdentification::add_base() {
   auto& floor = *out().mutable_floor()->mutable_fields();
   const auto parameters = base_term().parameters;
   for (std::size_t p = 4; p < parameters.size(); ++p) floor[parameters[p].name] = json_value(model_.values[p]);
+  for (std::size_t p = 0; p < parameters.size(); ++p) *out().add_floor_numbers() = number(p);
   floor["cell_later"] = json_value(json_list(model_.settings().radio.later));
 }
 

@@ -51,6 +51,18 @@ TEST(FloorFit, RecoversTheSpeedAndTheRange) {
   EXPECT_LT(after, 0.7 * before);
   EXPECT_NEAR(model.values[0], 9, 1.2);
   EXPECT_NEAR(model.values[4], 46, 2.8);
+  // Standard errors say how far off the values are, and fall as runs are added.
+  const std::vector<double> sd = standard_errors(model, target, 3);
+  for (const std::size_t p : {0u, 2u, 4u}) {
+    EXPECT_LT(std::abs(model.values[p] - truth.values[p]), 4 * sd[p]) << p;
+    EXPECT_LT(sd[p], model.parameters()[p].width) << p;
+  }
+  std::vector<FloorRun> more = runs_of(truth, 100);
+  for (const FloorRun& run : runs_of(truth, 300)) more.push_back(run);
+  for (const FloorRun& run : runs_of(truth, 500)) more.push_back(run);
+  const std::vector<double> less = standard_errors(model, FloorTarget(more, {}), 3);
+  EXPECT_LT(less[0], 0.85 * sd[0]);
+  EXPECT_LT(less[4], 0.85 * sd[4]);
 }
 
 TEST(FloorFit, ConvergesFromAFarStart) {
