@@ -71,6 +71,7 @@ void Comparison::count(Total& total, const Verdict& v) {
   total.causes += v.causes;
   total.named += v.named;
   total.wrong += static_cast<int>(v.false_findings.size());
+  total.alarms += v.false_findings.empty() ? 0 : 1;
 }
 
 void Comparison::add(const Scene& scene, const Play& play, const std::vector<Prediction>& oracle,
@@ -122,8 +123,8 @@ void Comparison::print_summary() const {
     fmt::print("{}: {} sets, error over the oracle's {:.3f}, base error over its own {:.2f}", t.method, t.sets,
                std::exp(per(t.log_ratio, t.sets)), std::exp(per(t.log_improvement, t.sets)));
     if (t.names)
-      fmt::print(", precision {:.2f}, recall {:.2f}, F1 {:.2f}", precision, recall,
-                 precision + recall > 0 ? 2 * precision * recall / (precision + recall) : 0);
+      fmt::print(", precision {:.2f}, recall {:.2f}, F1 {:.2f}, a false cause in {} sets", precision, recall,
+                 precision + recall > 0 ? 2 * precision * recall / (precision + recall) : 0, t.alarms);
     fmt::print(", {:.0f} s a set\n", per(t.seconds, t.sets));
   }
 }

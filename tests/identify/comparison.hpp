@@ -19,14 +19,14 @@ class Comparison {
   void add(const Scene&, const Play&, const std::vector<Prediction>& oracle, const Verdict& identified);
   void print_header() const;
   /// Over all rows: error over the oracle's and reduction of the base model's error (geometric means), precision, recall
-  /// and F1 of the causes, mean seconds.
+  /// and F1 of the causes, sets with a false cause, mean seconds.
   void print_summary() const;
 
  private:
   struct Total {
     std::string method;
     double log_ratio = 0, log_improvement = 0, seconds = 0;
-    int sets = 0, causes = 0, named = 0, wrong = 0;
+    int sets = 0, causes = 0, named = 0, wrong = 0, alarms = 0;
     bool names = false;
   };
   void count(Total&, const Verdict&);
