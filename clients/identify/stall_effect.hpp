@@ -23,7 +23,7 @@ struct StallEffect {
   double gain = 0;            ///< of the log likelihood, nat
   double held_out = 0,
          held_out_se = 0;  ///< the same in cross-validation over robots, and its standard error over tracks
-  /// 95 % intervals. Of the speed: by the curvature of the likelihood; nothing for robots that stand still.
+  /// 95 % intervals. Of the speed: by the likelihood; nothing for robots that stand still.
   std::pair<double, double> mean_apart_s, mean_length_s;
   std::optional<std::pair<double, double>> speed;
 };

@@ -351,7 +351,8 @@ Effect rare_spells(RareSpells spells) {
           .noise = {},
           .by_chance = true,
           .numbers = {{"mean time from one spell to the next", spells.mean_apart_s},
-                      {"mean duration", spells.scale_s / (spells.tail - 1)}}};
+                      {"mean duration", spells.scale_s / (spells.tail - 1)},
+                      {"speed within spells", spells.speed}}};
 }
 
 Effect heavy_tailed_noise() {
