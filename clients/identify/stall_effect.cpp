@@ -70,8 +70,8 @@ double fitted_speed(const SpellScan& scan, const MotionModel& model, Stalls stal
   return best > 0 && value(0) > gain - kClear ? 0 : best;
 }
 
-/// The speed within spells by a step of Newton's method, and half of its 95 % interval by the spread of the tracks' slopes (the sandwich
-/// estimator), since tracks differ by more than their noise.
+/// The speed within spells by a step of Newton's method, and half of its 95 % interval. The latter follows from the spread of the tracks'
+/// slopes (the sandwich estimator), since tracks differ by more than their noise.
 std::pair<double, double> speed_and_half(const SpellScan& scan, const MotionModel& model, Stalls stalls) {
   constexpr double kStep = 0.05, kLeastCurvature = 1;
   const double speed = stalls.gain;
