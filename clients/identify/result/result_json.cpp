@@ -57,7 +57,7 @@ json json_of(const google::protobuf::Message& message) {
 json json_of(const identification::Result& result) {
   json out = json_of(static_cast<const google::protobuf::Message&>(result));
   for (const char* of_one_kind :
-       {"robots", "statistics", "runs", "population", "measured_sent", "fitted_runs_themselves"}) {
+       {"robots", "statistics", "floor_numbers", "runs", "population", "measured_sent", "fitted_runs_themselves"}) {
     if (out.at(of_one_kind).empty()) out.erase(of_one_kind);
   }
   // Scripts read the entry whether or not there were windows enough for a learner.
