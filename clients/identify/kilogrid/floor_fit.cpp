@@ -255,6 +255,7 @@ std::vector<double> standard_errors(const FloorModel& model, const FloorTarget& 
       bread.eigenvectors() * inverse.asDiagonal() * bread.eigenvectors().transpose() * weighted.transpose();
   const std::vector<FloorParameter> parameters = model.parameters();
   std::vector<double> out;
+  out.reserve(parameters.size());
   for (std::size_t p = 0; p < parameters.size(); ++p) {
     const double sd = half.row(static_cast<Eigen::Index>(p)).norm() * kWidth * parameters[p].width;
     const bool seen = slopes.col(static_cast<Eigen::Index>(p)).squaredNorm() > 0;
