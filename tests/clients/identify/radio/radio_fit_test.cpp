@@ -82,9 +82,8 @@ TEST(Scores, PreferTheGeneratingModel) {
   EXPECT_EQ(errors.deficit, 0);
 }
 
-/// Margins and one deaf robot are recovered. Range and pattern are identified by their priors only: on a grid with
-/// few bearings they are confounded.
-TEST(LinkFit, RecoversItsParameters) {
+/// Only runs differ.
+proto::Radio radio_of_equal_robots() {
   proto::Radio radio;
   radio.set_model(proto::Radio::PROPAGATION);
   radio.set_range_mm(128);
@@ -95,6 +94,14 @@ TEST(LinkFit, RecoversItsParameters) {
   model.set_sensitivity_bearing_sd_db(0);
   model.set_link_sd_db(0);
   model.set_run_sd_db(0.8);
+  return radio;
+}
+
+/// Margins and one deaf robot are recovered. Range and pattern are identified by their priors only: on a grid with
+/// few bearings they are confounded.
+TEST(LinkFit, RecoversItsParameters) {
+  proto::Radio radio = radio_of_equal_robots();
+  proto::Propagation& model = *radio.mutable_propagation();
   proto::RobotRadio& deaf = *model.add_robot();
   deaf.set_robot(4);
   deaf.set_sensitivity_db(-2.5);
@@ -116,17 +123,9 @@ TEST(LinkFit, RecoversItsParameters) {
 }
 
 TEST(LinkIntervals, HoldTheSpreadOfRobots) {
-  proto::Radio radio;
-  radio.set_model(proto::Radio::PROPAGATION);
-  radio.set_range_mm(128);
+  proto::Radio radio = radio_of_equal_robots();
   proto::Propagation& model = *radio.mutable_propagation();
-  model.set_power_sd_db(0);
-  model.set_sensitivity_sd_db(0);
-  model.set_power_bearing_sd_db(0);
-  model.set_sensitivity_bearing_sd_db(0);
   model.set_pair_sd_db(0);
-  model.set_link_sd_db(0);
-  model.set_run_sd_db(0.8);
   constexpr std::uint64_t kSets = 8;
   int holds = 0;
   for (std::uint64_t k = 0; k < kSets; ++k) {
