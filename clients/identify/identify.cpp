@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -13,8 +14,9 @@
 #include "clients/identify/last_check.hpp"
 #include "clients/identify/model/model_file.hpp"
 #include "clients/identify/replay/simulation_check.hpp"
-#include "clients/identify/search/floor_parts.hpp"
 #include "clients/identify/search/products.hpp"
+#include "clients/identify/study.hpp"
+#include "clients/identify/track_search.hpp"
 #include "clients/identify/unexplained/prediction_windows.hpp"
 #include "core/base/error.hpp"
 
@@ -33,13 +35,6 @@ std::vector<Window> fitted_windows(const FitState& fit, const std::vector<Foreca
   for (const Forecast& f : forecasts)
     if (!fit.tracks.set().runs[f.run].tracks[f.place].held_out) of_fit.push_back(f);
   return windows_of(fit.tracks, of_fit, horizon_s);
-}
-
-/// The model as it would be if only the white part of its process noise were noise: it expects smaller errors of itself.
-FitState with_white_noise(const Fitter& fitter, const FitState& fit) {
-  FitState white = fit;
-  white.model.noise = white_part(fit.model.noise, persistent_share(fitter, fit));
-  return white;
 }
 
 /// Errors, their intervals and floors, and what remains unexplained.
@@ -153,32 +148,16 @@ FitState refitted(const Fitter& fitter, const FitState& part, const MeasuredSet&
   return all;
 }
 
-/// The search on the tracks of the fit; without effects the base model alone.
-Search found_by_search(const Fitter& fitter, const FitState& base, const MeasuredSet& train,
-                       const ForecastTimes& times, const Options& options, const WorkLog& log) {
-  Search found{base, {}, {{base, {}}}, {}, {}, {}, {}};
-  if (!options.find_effects) return found;
-  const auto leaves_much = [&](const FitState& fit) {
-    const std::vector<Forecast> all = forecast(fit.model, fit.tracks, times, Tracks::kFit, options.threads);
-    const FitState white = with_white_noise(fitter, fit);
-    const std::vector<Forecast> expected = forecast(white.model, fit.tracks, times, Tracks::kFit, options.threads);
-    // Motion in contact is uncertain, and no effect.
-    const std::vector<Forecast> free =
-        from_known_starts(free_ones(fit.model, fit.tracks, with_expectations_of(expected, all), options.horizon_s));
-    const PredictionErrors errors = errors_of(train, free);
-    return leaves_systematic_error(train, windows_of(fit.tracks, free, options.horizon_s), errors, options.threads);
-  };
-  found = search(fitter, base, log, leaves_much);
-  log.begin(kTermChecks, "search", "checking each effect", found.fit.model.terms.size());
-  keep_predictive_terms(fitter, train, times, found);
-  fit_floor_parts(fitter, found);
-  return found;
-}
-
 /// The noise that is written and reported, with its intervals.
 void set_noise(Findings& f, const Fitter& fitter) {
   f.noise = fitter.noise_interval(f.found.fit);
   f.found.fit.model.noise = f.noise.most_likely;
+}
+
+void reject_stalls(Findings& f, const char* why) {
+  f.found.rejected.insert(f.found.rejected.begin(),
+                          {"stalls", {"episodes"}, "wheel speed", f.stalls->log10_p, kStallThreshold_log10_p, why});
+  f.stalls.reset();
 }
 
 /// Stalls, and the noise beside them, in place of the model without. They are looked for in the tracks of the fit. They stay unless the
@@ -196,13 +175,7 @@ void choose_stalls(Findings& f, const Fitter& fitter, const Evaluation& choosing
     f.found.fit = std::move(with);
     return;
   }
-  f.found.rejected.insert(f.found.rejected.begin(), {"stalls",
-                                                     {"episodes"},
-                                                     "wheel speed",
-                                                     f.stalls->log10_p,
-                                                     kStallThreshold_log10_p,
-                                                     "held-out data are predicted worse with it, beyond chance"});
-  f.stalls.reset();
+  reject_stalls(f, "held-out data are predicted worse with it, beyond chance");
 }
 
 /// The last check, with stalls; then, beside a test set, the refit to all of the training data.
@@ -232,13 +205,18 @@ void choose(Findings& f, const Fitter& fitter, const MeasuredSet& train, const M
     f.base = refitted(fitter, f.base, whole);
     f.found.fit = is_base ? f.base : refitted(fitter, f.found.fit, whole);
     finish();
-    if (f.stalls) f.stalls = find_stalls(fitter, f.found.fit);
+    if (f.stalls) {
+      if (auto again = find_stalls(fitter, f.found.fit))
+        f.stalls = std::move(again);
+      else
+        reject_stalls(f, "not significant in all training data together");
+    }
   }
   if (f.stalls) set_noise(f, fitter);
 }
 
 /// The errors that are reported.
-void judge(Findings& f, const Fitter& fitter, const Evaluation& evaluation, const ForecastTimes& reported) {
+void judge_errors(Findings& f, const Fitter& fitter, const Evaluation& evaluation, const ForecastTimes& reported) {
   f.before = evaluation.judge(f.base, reported);
   f.after = evaluation.judge(f.found.fit, reported);
   // A model that diverges gives no prediction for some rows.
@@ -263,69 +241,138 @@ Tracks reporting_tracks(const MeasuredSet& train, const MeasuredSet* test, const
   return reporting.judge(base, times).errors.rows > 0 ? Tracks::kReporting : Tracks::kHeldOut;
 }
 
-}  // namespace
+/// The set without a track that is held out.
+MeasuredSet all_fitted(MeasuredSet set) {
+  for (Run& run : set.runs)
+    for (Track& track : run.tracks) track.held_out = track.chooses = false;
+  return set;
+}
 
-Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Options& options) {
-  const WorkLog log(options.progress);
+/// The study of measured tracks.
+class TrackStudy final : public Study {
+ public:
+  TrackStudy(MeasuredSet train, std::optional<MeasuredSet> test, std::vector<DataFault> faults, Options options);
+  void fit() override;
+  void search() override;
+  void judge() override;
+  Identified report() override;
+
+ private:
+  [[nodiscard]] const MeasuredSet* test() const { return test_ ? &*test_ : nullptr; }
+  void begin(WorkKind kind, const char* stage) { log_.begin(kind, stage, "", f_.found.fit.model.terms.size()); }
+  void add_models(Identified& out) const;
+
+  const MeasuredSet train_;
+  const MeasuredSet whole_train_;  ///< the same without tracks that are held out
+  const std::optional<MeasuredSet> test_;
+  const std::vector<DataFault> faults_;
+  const Options options_;
+  const ForecastTimes times_;
+  ForecastTimes reported_;  ///< the same, by rollouts
+  const WorkLog log_;
+  Findings f_;
+  const Fitter fitter_;
+  std::optional<Evaluation> evaluation_;
+};
+
+/// The base model before its fit.
+Findings unfitted(const MeasuredSet& train) {
   FitState base(train);
   if (base.tracks.units().empty())
     throw UserError("no track of the training runs has two samples; give longer tracks");
-  const ForecastTimes times{10, 5, options.horizon_s};
-  ForecastTimes reported = times;
-  reported.rollouts = kRollouts;
+  return {base, {base, {}, {{base, {}}}, {}, {}, {}, {}}};
+}
 
-  log.begin(kBaseModel, "base model", "fitting", 0,
-            options.find_effects ? std::optional(kMostRounds) : std::nullopt);
-  const Fitter fitter(train, options.threads);
-  fitter.fit_base(base);
-  const Evaluation evaluation(train, test, reporting_tracks(train, test, base, times, options.threads),
-                              options.threads);
-  Findings f{base, found_by_search(fitter, base, train, times, options, log)};
-  f.held_out = evaluation.held_out();
-  f.model_file = options.model_file;
-  const auto begin = [&](WorkKind kind, const char* stage) {
-    log.begin(kind, stage, "", f.found.fit.model.terms.size());
-  };
+TrackStudy::TrackStudy(MeasuredSet train, std::optional<MeasuredSet> test, std::vector<DataFault> faults,
+                       Options options)
+    : train_(std::move(train)),
+      whole_train_(all_fitted(train_)),
+      test_(std::move(test)),
+      faults_(std::move(faults)),
+      options_(std::move(options)),
+      times_{10, 5, options_.horizon_s},
+      reported_(times_),
+      log_(options_.progress),
+      f_(unfitted(train_)),
+      fitter_(train_, options_.threads) {
+  reported_.rollouts = kRollouts;
+  f_.model_file = options_.model_file;
+}
+
+void TrackStudy::fit() {
+  log_.begin(kBaseModel, "base model", "fitting", 0,
+             options_.find_effects ? std::optional(kMostRounds) : std::nullopt);
+  fitter_.fit_base(f_.base);
+  f_.found.fit = f_.base;
+  f_.found.path = {{f_.base, {}}};
+}
+
+void TrackStudy::search() { f_.found = search_tracks(fitter_, f_.base, train_, times_, log_); }
+
+void TrackStudy::judge() {
+  evaluation_.emplace(train_, test(), reporting_tracks(train_, test(), f_.base, times_, options_.threads),
+                      options_.threads);
+  f_.held_out = evaluation_->held_out();
   begin(kLastCheck, "last check on held-out data");
-  MeasuredSet all_fitted = train;
-  for (Run& run : all_fitted.runs)
-    for (Track& track : run.tracks) track.held_out = track.chooses = false;
-  choose(f, fitter, train, test != nullptr ? all_fitted : train, evaluation, reported, options.find_effects);
+  choose(f_, fitter_, train_, test_ ? whole_train_ : train_, *evaluation_, reported_, options_.find_effects);
   begin(kErrors, "prediction errors");
-  judge(f, fitter, evaluation, reported);
+  judge_errors(f_, fitter_, *evaluation_, reported_);
   begin(kUnexplained, "what is left unexplained");
-  f.numbering = numbering_of(fitter, f.base);
+  f_.numbering = numbering_of(fitter_, f_.base);
   // An effect that the base model lacks makes the robots' speeds differ from run to run.
-  if (f.numbering.anew()) f.numbering = numbering_of(fitter, f.found.fit);
-  assess(f, fitter, train, test, evaluation, reported);
-  f.uncertainty = uncertainty_of(fitter, f.found.fit);
-  f.steps = step_intervals_of(fitter, f.found.fit, f.uncertainty);
-  f.geometry = geometry_intervals_of(fitter, f.found.fit, f.uncertainty);
-  if (f.found.fit.model.base.command_lag_s != 0) f.command_lag_s = fitter.command_lag_interval(f.found.fit);
-  const std::vector<NoiseSample> noise_samples = noise_samples_of(f.found.fit, options.threads);
-  f.noise_ratios = noise_ratios_of(noise_samples);
-  if (options.find_effects) f.noise_effects = find_noise_effects(noise_samples);
+  if (f_.numbering.anew()) f_.numbering = numbering_of(fitter_, f_.found.fit);
+  assess(f_, fitter_, train_, test(), *evaluation_, reported_);
+}
+
+/// The written model, models that the data do not tell from it, and draws from its posterior.
+void TrackStudy::add_models(Identified& out) const {
+  const FitState& fit = f_.found.fit;
+  out.model = proto_of(fit.model);
+  write_noise_effects(out.model, fit.model.noise, f_.noise_effects);
+  out.candidates = candidates_of(f_, fitter_);
+  const PosteriorDraws posterior(fit.model, f_.uncertainty);
+  for (std::uint32_t n = 1; n <= options_.draws; ++n) {
+    out.draws.push_back(proto_of(posterior.draw(kDrawsSeed, n)));
+    write_noise_effects(out.draws.back(), fit.model.noise, f_.noise_effects);
+  }
+}
+
+Identified TrackStudy::report() {
+  const FitState& fit = f_.found.fit;
+  f_.uncertainty = uncertainty_of(fitter_, fit);
+  f_.steps = step_intervals_of(fitter_, fit, f_.uncertainty);
+  f_.geometry = geometry_intervals_of(fitter_, fit, f_.uncertainty);
+  if (fit.model.base.command_lag_s != 0) f_.command_lag_s = fitter_.command_lag_interval(fit);
+  const std::vector<NoiseSample> noise_samples = noise_samples_of(fit, options_.threads);
+  f_.noise_ratios = noise_ratios_of(noise_samples);
+  if (options_.find_effects) f_.noise_effects = find_noise_effects(noise_samples);
 
   Identified out;
-  out.predictions = predictions_of(f, evaluation.set());
-  out.found = document_of(f, train, test, options.horizon_s, options.threads);
+  out.predictions = predictions_of(f_, evaluation_->set());
+  out.found = document_of(f_, train_, test(), options_.horizon_s, options_.threads);
   begin(kHorizon, "errors over the horizon");
-  add_horizon(out.found, f, evaluation, options.threads);
+  add_horizon(out.found, f_, *evaluation_, options_.threads);
   begin(kSimulation, "simulation check");
-  out.model = proto_of(f.found.fit.model);
-  write_noise_effects(out.model, f.found.fit.model.noise, f.noise_effects);
-  out.candidates = candidates_of(f, fitter);
-  const PosteriorDraws posterior(f.found.fit.model, f.uncertainty);
-  for (std::uint32_t n = 1; n <= options.draws; ++n) {
-    out.draws.push_back(proto_of(posterior.draw(kDrawsSeed, n)));
-    write_noise_effects(out.draws.back(), f.found.fit.model.noise, f.noise_effects);
-  }
-  const proto::Model written_before = proto_of(f.base.model);
+  add_models(out);
+  const proto::Model written_before = proto_of(f_.base.model);
   // Simulations give no error that a choice could make too small: all held-out tracks count.
-  const Tracks compared = test != nullptr ? Tracks::kAll : Tracks::kHeldOut;
-  add_simulation_check({f.base.model, written_before}, {f.found.fit.model, out.model}, f.after.tracks, compared,
-                       options.threads, out.found);
+  const Tracks compared = test_ ? Tracks::kAll : Tracks::kHeldOut;
+  add_simulation_check({f_.base.model, written_before}, {fit.model, out.model}, f_.after.tracks, compared,
+                       options_.threads, out.found);
+  add_faults(*out.found.mutable_result(), faults_);
   return out;
+}
+
+}  // namespace
+
+std::unique_ptr<Study> track_study(MeasuredSet train, std::optional<MeasuredSet> test,
+                                   std::vector<DataFault> faults, const Options& options) {
+  return std::make_unique<TrackStudy>(std::move(train), std::move(test), std::move(faults), options);
+}
+
+Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Options& options) {
+  TrackStudy study(train, test == nullptr ? std::nullopt : std::optional(*test), {}, options);
+  return identified_by(study, options);
 }
 
 }  // namespace kilotwin::identify

@@ -356,7 +356,7 @@ int judge_rivals(const Arguments& arguments, const fs::path& folder) {
     const std::vector<Prediction> oracle = oracle_of(scene, played, arguments.small ? 30 : 100);
     const Verdict verdict = try_set(arguments, scene, played, oracle, folder / scene.name);
     if (!verdict.failure.empty()) ++failed;
-    comparison.add(scene, played, oracle, verdict);
+    comparison.add(scene, played, oracle, verdict, folder / scene.name / "out");
   }
   comparison.print_summary();
   return failed;

@@ -161,6 +161,17 @@ TEST(Stalls, AreFoundWithTheirParametersAndWritten) {
   EXPECT_EQ(written, 1);
 }
 
+TEST(Stalls, SharesOfIntervalsAreShares) {
+  // A share above 1 would have a negative variance, and nothing beside the spells could be fitted.
+  const WithStalls f(small({truth::rare_spells({15, 2, 1.2, 0})}));
+  ASSERT_TRUE(f.found);
+  for (const TrackView& view : f.state.tracks.views()) {
+    ASSERT_NE(view.spells, nullptr);
+    for (const float share : *view.spells) EXPECT_TRUE(share >= 0 && share <= 1) << share;
+  }
+  EXPECT_NE(f.state.model.base.straight_mm_s, f.base.base.straight_mm_s) << "fitted again beside the spells";
+}
+
 TEST(Stalls, SlipsHaveASpeed) {
   const WithStalls f(small({truth::rare_spells({30, 9, 3, 0.4})}));
   ASSERT_TRUE(f.found);

@@ -169,6 +169,12 @@ bool Verdict::good() const {
   return failure.empty() && missing_rows == 0 && ratio() <= kRatio && unnamed.empty() && false_findings.empty();
 }
 
+std::map<Key, Vec> base_predictions(const std::filesystem::path& out) {
+  std::map<Key, Vec> before;
+  for (const auto& [key, row] : read_rows(out / "predictions.csv")) before[key] = row.before;
+  return before;
+}
+
 Verdict judge(const Scene& scene, const std::vector<Prediction>& oracle, const std::filesystem::path& out) {
   Verdict verdict;
   verdict.scene = scene.name;

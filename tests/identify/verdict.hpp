@@ -2,7 +2,9 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "tests/identify/truth/oracle.hpp"
@@ -36,6 +38,9 @@ struct Verdict {
 
 /// Uses OUT/predictions.csv and OUT/result.json only.
 Verdict judge(const Scene& scene, const std::vector<Prediction>& oracle, const std::filesystem::path& out);
+
+/// The base model's predictions in OUT/predictions.csv, by run, robot and time in ms.
+[[nodiscard]] std::map<std::tuple<std::string, int, long>, Vec> base_predictions(const std::filesystem::path& out);
 
 /// Whether an effect with these covariates names the true effect.
 bool names(const Effect& effect, const Covariates& covariates);

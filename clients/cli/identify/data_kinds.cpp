@@ -8,12 +8,13 @@
 #include <utility>
 #include <vector>
 
-#include "clients/cli/identify/radio_data.hpp"
+#include "clients/cli/identify/film_data.hpp"
 #include "clients/cli/identify/trajectory_data.hpp"
 #include "clients/identify/bristle/identify_bristle.hpp"
 #include "clients/identify/data/import.hpp"
 #include "clients/identify/kilogrid/floor_protocol.hpp"
 #include "clients/identify/kilogrid/identify_floor.hpp"
+#include "clients/identify/radio/radio_study.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::cli {
@@ -59,31 +60,33 @@ std::string contents_of(const fs::path& directory) {
 }
 
 bool has_tracks(const fs::path& data) {
-  return identify::has_trajectories(data) || !identify::importable(data).empty();
+  return identify::has_trajectories(data) || !identify::importable(data).empty() || !films_of(data).empty();
 }
 
-identify::Identified identify_floor_data(const fs::path& train, const fs::path& test, const fs::path&,
-                                         const identify::Options& options) {
+std::unique_ptr<identify::Study> read_floor(const DataPlaces& places, const identify::Options& options) {
   std::vector<kilogrid::FloorRun> held_out;
-  if (!test.empty()) held_out = kilogrid::read_floor_runs(test);
+  if (!places.test.empty()) held_out = kilogrid::read_floor_runs(places.test);
   // Beside the days that are reported.
-  const fs::path opened_days = (test.empty() ? train : test) / kilogrid::OpenedDays::kFile;
-  return kilogrid::identify_floor(kilogrid::read_floor_runs(train), std::move(held_out), options, opened_days);
+  const fs::path opened_days = (places.test.empty() ? places.train : places.test) / kilogrid::OpenedDays::kFile;
+  return kilogrid::floor_study(kilogrid::read_floor_runs(places.train), std::move(held_out), options, opened_days);
 }
 
-identify::Identified identify_bristle_data(const fs::path& train, const fs::path& test, const fs::path&,
-                                           const identify::Options& options) {
+std::unique_ptr<identify::Study> read_bristle(const DataPlaces& places, const identify::Options& options) {
   std::vector<bristle::BristleRun> held_out;
-  if (!test.empty()) held_out = bristle::read_bristle_runs(test);
-  return bristle::identify_bristle(bristle::read_bristle_runs(train), std::move(held_out), options);
+  if (!places.test.empty()) held_out = bristle::read_bristle_runs(places.test);
+  return bristle::bristle_study(bristle::read_bristle_runs(places.train), std::move(held_out), options);
+}
+
+std::unique_ptr<identify::Study> read_radio(const DataPlaces& places, const identify::Options& options) {
+  return radio_fit::radio_study({places.train, places.test}, {}, places.out / "radio", options);
 }
 
 /// In the order in which they are recognised: the columns of a recording include those of a Kilogrid run.
 constexpr std::array<DataKind, 4> kDataKinds = {
-    {{"trajectories", has_tracks, identify_trajectories, true},
-     {"Kilogrid runs", kilogrid::has_floor_runs, identify_floor_data, false},
-     {"bristle plate tracks", bristle::has_bristle_runs, identify_bristle_data, false},
-     {"radio counts (comm_tau*_run*.dat)", has_radio_runs, identify_radio_runs, false}}};
+    {{"trajectories", has_tracks, read_tracks, true},
+     {"Kilogrid runs", kilogrid::has_floor_runs, read_floor, false},
+     {"bristle plate tracks", bristle::has_bristle_runs, read_bristle, false},
+     {"radio counts (comm_tau*_run*.dat)", radio_fit::has_radio_runs, read_radio, false}}};
 
 }  // namespace
 
@@ -105,10 +108,13 @@ const DataKind& kind_of_data(const std::string& option, const fs::path& data) {
                     "--trajectories DIR/FILE.csv",
                     option, data.string(), data.string()));
   }
-  throw UserError(fmt::format(
-      "{} {}: {}; expected {}, or ARK logs (*.tsv, *.txt, *.log), or files of kilotwin "
-      "export --trajectories, or tables of kilotwin track; state the columns of other tables with --columns",
-      option, data.string(), contents_of(data), kExpected));
+  throw UserError(
+      fmt::format("{} {}: {}; expected {}, or ARK logs (*.tsv, *.txt, *.log), or files of kilotwin "
+                  "export --trajectories, or tables of kilotwin track, or films; state the columns of other tables "
+                  "with --columns",
+                  option, data.string(), contents_of(data), kExpected));
 }
+
+const DataKind& kind_of_tables() { return kDataKinds.front(); }
 
 }  // namespace kilotwin::cli

@@ -8,6 +8,7 @@
 
 #include "clients/report/html.hpp"
 #include "clients/report/plot.hpp"
+#include "clients/report/templates.hpp"
 #include "core/base/say.hpp"
 #include "core/os/files.hpp"
 
@@ -100,23 +101,27 @@ html::Table table_of_commands(const Design& design) {
   return table;
 }
 
+html::Table table_of_parameters(const Design& design, const DesignQuestion& question) {
+  html::Table table({"parameter", "standard deviation now", "after the recording"});
+  for (std::size_t p = 0; p < design.sd_after.size(); ++p)
+    table.row({html::escaped(question.columns[p].name), fmt::format("{:.3g}", question.columns[p].sd),
+               fmt::format("{:.3g}", design.sd_after[p])});
+  return table;
+}
+
 std::string page_of(const Design& design, const DesignQuestion& question, const std::string& source) {
-  std::string body = fmt::format(
-      "<header><p class=\"kicker\">Kilotwin · identify --design</p><h1>The next recording</h1>\n"
-      "<p class=\"verdict\">{}</p></header>\n<figure>{}<figcaption>The shaded range holds {} plans of random "
-      "commands.</figcaption></figure>\n",
-      html::escaped(design_in_words(design, question)),
-      html::image(plot_svg(information_plot(design)), "information over time"), design.random.size());
+  html::Data data{html::Data::type::object};
+  data.set("verdict", design_in_words(design, question));
+  data.set("information", html::image(plot_svg(information_plot(design)), "information over time"));
+  data.set("random_plans", std::to_string(design.random.size()));
   if (!design.sd_after.empty()) {
-    html::Table table({"parameter", "standard deviation now", "after the recording"});
-    for (std::size_t p = 0; p < design.sd_after.size(); ++p)
-      table.row({html::escaped(question.columns[p].name), fmt::format("{:.3g}", question.columns[p].sd),
-                 fmt::format("{:.3g}", design.sd_after[p])});
-    body += "<section id=\"parameters\"><h2>Parameters</h2>\n" + table.text() + "</section>\n";
+    html::Data parameters{html::Data::type::object};
+    parameters.set("table", table_of_parameters(design, question).text());
+    data.set("parameters", parameters);
   }
-  body += "<section id=\"commands\"><h2>Commands</h2>\n" + table_of_commands(design).text() + "</section>\n";
-  body += fmt::format("<section id=\"from\"><h2>Made from</h2><p>{}</p></section>\n", html::escaped(source));
-  return html::page("Kilotwin: the next recording", body);
+  data.set("commands", table_of_commands(design).text());
+  data.set("source", source);
+  return html::page("Kilotwin: the next recording", html::rendered(html::templates::kDesign, data));
 }
 
 }  // namespace

@@ -13,7 +13,6 @@
 #include "clients/cli/identify/unfinished.hpp"
 #include "clients/cli/output.hpp"
 #include "clients/cli/progress.hpp"
-#include "clients/identify/data/measured_set.hpp"
 #include "clients/identify/data/table_import.hpp"
 #include "clients/identify/identify.hpp"
 #include "clients/identify/model/model_file.hpp"
@@ -121,9 +120,16 @@ bool states_format(const IdentifyArguments& arguments) {
 }
 
 /// The kind of the data; both directories must hold the same. Throws UserError.
-const DataKind& checked_kind(const IdentifyArguments& arguments, const fs::path& train, const fs::path& test) {
-  const DataKind& kind = kind_of_data("--train", train);
-  if (!arguments.test.empty() && &kind_of_data("--test", test) != &kind)
+const DataKind& checked_kind(const IdentifyArguments& arguments) {
+  if (states_format(arguments)) {
+    for (const auto& [option, data] :
+         {std::pair("--train", &arguments.train), std::pair("--test", &arguments.test)})
+      if (!data->empty() && !fs::is_directory(*data))
+        throw UserError(fmt::format("{} {}: is no directory; name one that holds tables", option, data->string()));
+    return kind_of_tables();
+  }
+  const DataKind& kind = kind_of_data("--train", arguments.train);
+  if (!arguments.test.empty() && &kind_of_data("--test", arguments.test) != &kind)
     throw UserError(fmt::format("--test {}: does not hold {}; give the same kind of data as --train",
                                 arguments.test.string(), kind.name));
   if (arguments.draws > 0 && !kind.has_draws)
@@ -134,48 +140,27 @@ const DataKind& checked_kind(const IdentifyArguments& arguments, const fs::path&
   return kind;
 }
 
-/// Checks of the inputs that are possible before --force removes an older result.
-void check_inputs(const IdentifyArguments& arguments) {
-  if (!states_format(arguments)) {
-    checked_kind(arguments, arguments.train, arguments.test);
-    return;
-  }
-  for (const auto& [option, data] : {std::pair("--train", &arguments.train), std::pair("--test", &arguments.test)})
-    if (!data->empty() && !fs::is_directory(*data))
-      throw UserError(fmt::format("{} {}: is no directory; name one that holds tables", option, data->string()));
-}
-
-/// The directory of data, or its tables under the names, units and axes that the options state.
-fs::path converted(const IdentifyArguments& arguments, const fs::path& data, const fs::path& to) {
-  if (data.empty() || !states_format(arguments)) return data;
+/// The names, units and axes that the options state.
+std::optional<identify::TableFormat> format_of(const IdentifyArguments& arguments) {
+  if (!states_format(arguments)) return std::nullopt;
   identify::TableFormat format;
-  if (identify::has_trajectories(data)) format.run = "run";
   if (!arguments.columns.empty()) identify::set_columns(format, arguments.columns);
-  if (format.heading.empty() && identify::has_headings(data)) format.heading = "heading_rad";
-  if (format.heading.empty() && arguments.angle == "deg")
-    throw UserError(
-        fmt::format("--angle deg: {} has no column heading_rad; name the column of headings: "
-                    "--columns heading=NAME",
-                    data.string()));
   format.unit_mm = arguments.unit_mm.value_or(1);
   format.unit_s = arguments.unit_s.value_or(1);
   format.degrees = arguments.angle == "deg";
   format.image = arguments.frame == "image";
-  identify::import_tables(data, to, format);
-  return to;
+  return format;
 }
 
 int identify_data(const IdentifyArguments& arguments) {
   if (!(arguments.horizon_s > 0)) throw UserError("--horizon: give a number of seconds above 0");
   warn_beyond_cores("--threads", arguments.threads);
-  check_inputs(arguments);
+  // Before --force removes an older result.
+  const DataKind& kind = checked_kind(arguments);
+  const std::optional<identify::TableFormat> format = format_of(arguments);
   const fs::path fallback = "identified";
   const fs::path out = make_plain_output(arguments.output, fallback, {arguments.train, arguments.test});
   Unfinished unfinished(out);
-  // Tables of other trackers become files that the command reads.
-  const fs::path train = converted(arguments, arguments.train, out / "imported-train"),
-                 test = converted(arguments, arguments.test, out / "imported-test");
-  const DataKind& kind = checked_kind(arguments, train, test);
   identify::Options options;
   options.horizon_s = arguments.horizon_s;
   options.threads = arguments.threads;
@@ -184,7 +169,8 @@ int identify_data(const IdentifyArguments& arguments) {
   std::optional<WorkProgress> progress(std::in_place, !arguments.quiet);
   options.progress = [&](const stats::Work& work) { progress->begin(work); };
   progress->begin({"reading", arguments.train.string(), stats::Work::kSame});
-  identify::Identified found = kind.identify(train, test, out, options);
+  identify::Identified found =
+      identify::identified_by(*kind.read({arguments.train, arguments.test, out, format}, options), options);
 
   progress->begin({"drawing the report", "", stats::Work::kSame});
   clamp_to_ranges(found.model);

@@ -1,17 +1,12 @@
-/// Trajectories with or without commands as input of `kilotwin identify`.
+/// Measured trajectories as input of `kilotwin identify`: the command's own checks before the pure engine.
 #pragma once
 
-#include <filesystem>
-
-#include "clients/identify/identify.hpp"
+#include "clients/cli/identify/data_kinds.hpp"
 
 namespace kilotwin::cli {
 
-/// Reads both sets, or imports them into `out`; excludes faults of the data; fits. Throws UserError on malformed or
-/// implausible data.
-[[nodiscard]] identify::Identified identify_trajectories(const std::filesystem::path& train,
-                                                         const std::filesystem::path& test,
-                                                         const std::filesystem::path& out,
-                                                         const identify::Options&);
+/// The study of measured tracks. Sets that are not in trajectories.csv are also written into `out`, for users to look at:
+/// imported-train/ and imported-test/. Throws UserError on malformed or implausible files.
+[[nodiscard]] std::unique_ptr<identify::Study> read_tracks(const DataPlaces&, const identify::Options&);
 
 }  // namespace kilotwin::cli

@@ -38,6 +38,8 @@ struct BristleInstant {
 
 class BristleModel {
  public:
+  /// Without any fit.
+  BristleModel() = default;
   /// Fits the population parameters. Parameters of single runs follow from their past.
   explicit BristleModel(const std::vector<BristleInstant>& train);
 

@@ -18,7 +18,7 @@
 namespace kilotwin::bristle {
 namespace {
 
-using identify::Identified, identify::Options, identify::json_value;
+using identify::Identified, identify::Options, identify::Study, identify::json_value;
 /// False alarm rate per set.
 constexpr double kChance = 0.01;
 /// An effect enters the model if its gain exceeds as many standard errors over runs. Then less than 1 in 100 sets has a
@@ -272,40 +272,28 @@ proto::Model proto_of(const BristleModel& m, const BristleEffects& on) {
 }
 
 /// One identification, in the order of its public functions.
-class BristleIdentification {
+class BristleStudy final : public Study {
  public:
-  BristleIdentification(const std::vector<BristleRun>& train, const std::vector<BristleRun>& test,
-                        const Options& options)
-      : options_(options),
-        train_(train),
-        test_(test),
-        learned_(instants_of(train, options.horizon_s)),
-        judged_(instants_of(test, options.horizon_s)),
-        model_(demand_instants(learned_, judged_, options.horizon_s)),
-        now_in_(errors_in({})),
-        before_out_(errors_out({})),
-        now_out_(before_out_) {
-    add_step("base", now_out_);
+  BristleStudy(std::vector<BristleRun> train, std::vector<BristleRun> test, Options options)
+      : options_(std::move(options)),
+        train_(std::move(train)),
+        test_(std::move(test)),
+        learned_(instants_of(train_, options_.horizon_s)),
+        judged_(instants_of(test_, options_.horizon_s)) {
+    if (learned_.empty() || judged_.empty())
+      throw UserError(
+          fmt::format("no run has {:g} s without a gap; give a shorter --horizon", options_.horizon_s + 3));
   }
 
-  /// Forward selection: adds the effect with the largest significant reduction of the error on the training runs.
-  void search();
-  /// Backward elimination by cross-validation.
-  void eliminate();
-  /// Each effect on held-out runs.
-  void judge();
-  [[nodiscard]] Identified result();
+  void fit() override;
+  /// Forward selection, then backward elimination by cross-validation.
+  void search() override;
+  void judge() override;
+  Identified report() override;
 
  private:
   enum Stage { kSearch, kElimination, kJudgement };
   void begin(Stage) const;
-  static const std::vector<BristleInstant>& demand_instants(const std::vector<BristleInstant>& learned,
-                                                            const std::vector<BristleInstant>& judged,
-                                                            double horizon_s) {
-    if (learned.empty() || judged.empty())
-      throw UserError(fmt::format("no run has {:g} s without a gap; give a shorter --horizon", horizon_s + 3));
-    return learned;
-  }
   [[nodiscard]] identification::Result& out() { return *found_.mutable_result(); }
   [[nodiscard]] Errors errors_in(const BristleEffects& on) const {
     return errors_of(learned_, model_.predict(learned_, options_.horizon_s, on), train_.size());
@@ -326,30 +314,45 @@ class BristleIdentification {
   [[nodiscard]] std::optional<std::size_t> best_addition() const;
   [[nodiscard]] bool is_significant(std::size_t effect, const Errors& errors) const;
   void reject(std::size_t effect, const char* why);
+  /// Adds the effect with the largest significant reduction of the error on the training runs, until there is none.
+  void select();
+  void eliminate();
   void add_faults();
   void add_runs();
   void add_horizon();
 
-  const Options& options_;
-  const std::vector<BristleRun>&train_, &test_;
+  const Options options_;
+  const std::vector<BristleRun> train_, test_;
   const std::vector<BristleInstant> learned_, judged_;
-  const BristleModel model_;
+  BristleModel model_;
   identification::Identification found_;
   BristleEffects on_ = {};
   std::vector<BristleEffect> order_;  ///< of the effects in the model
   Errors now_in_;                     ///< of the model, on the training runs
-  const Errors before_out_;           ///< on held-out runs
+  Errors before_out_;                 ///< on held-out runs
   Errors now_out_;
 };
 
-bool BristleIdentification::is_significant(std::size_t effect, const Errors& errors) const {
+void BristleStudy::fit() {
+  model_ = BristleModel(learned_);
+  now_in_ = errors_in({});
+  before_out_ = now_out_ = errors_out({});
+  add_step("base", now_out_);
+}
+
+void BristleStudy::search() {
+  select();
+  eliminate();
+}
+
+bool BristleStudy::is_significant(std::size_t effect, const Errors& errors) const {
   // The test of drift uses velocities, whether or not it improves predictions.
   const bool drifting = effect == index_of(BristleEffect::kDrift) && model_.drift_p < kChance / kBristleEffects &&
                         errors.mean() < now_in_.mean();
   return drifting || now_in_.mean() - errors.mean() >= kStandardErrors * now_in_.error(&errors);
 }
 
-std::optional<std::size_t> BristleIdentification::best_addition() const {
+std::optional<std::size_t> BristleStudy::best_addition() const {
   std::optional<std::size_t> best;
   double best_mean = 0;
   for (std::size_t e = 0; e < kBristleEffects; ++e) {
@@ -367,7 +370,7 @@ std::optional<std::size_t> BristleIdentification::best_addition() const {
 }
 
 /// Each addition tests all effects that are off, and half of them are expected to be found.
-void BristleIdentification::begin(Stage stage) const {
+void BristleStudy::begin(Stage stage) const {
   constexpr std::array kNames{"search", "backward elimination", "errors on held-out runs"};
   if (!options_.progress) return;
   const double most = stage == kSearch ? static_cast<double>(kBristleEffects - order_.size()) : 0;
@@ -376,7 +379,7 @@ void BristleIdentification::begin(Stage stage) const {
   options_.progress(work);
 }
 
-void BristleIdentification::search() {
+void BristleStudy::select() {
   begin(kSearch);
   while (const std::optional<std::size_t> best = best_addition()) {
     on_[*best] = true;
@@ -389,7 +392,7 @@ void BristleIdentification::search() {
   }
 }
 
-void BristleIdentification::reject(std::size_t effect, const char* why) {
+void BristleStudy::reject(std::size_t effect, const char* why) {
   identification::Rejected& rejected = *out().add_rejected();
   rejected.set_name(kEffects[effect].name);
   identify::assign(rejected.mutable_covariates(), kEffects[effect].covariates);
@@ -397,7 +400,7 @@ void BristleIdentification::reject(std::size_t effect, const char* why) {
   rejected.set_why(why);
 }
 
-void BristleIdentification::eliminate() {
+void BristleStudy::eliminate() {
   begin(kElimination);
   const Folds folds(learned_, options_.horizon_s);
   for (std::size_t i = order_.size(); i-- > 0;) {
@@ -425,7 +428,7 @@ void BristleIdentification::eliminate() {
   }
 }
 
-void BristleIdentification::judge() {
+void BristleStudy::judge() {
   begin(kJudgement);
   *out().mutable_before() = accuracy_of(before_out_);
   *out().mutable_after() = accuracy_of(now_out_);
@@ -457,7 +460,7 @@ void BristleIdentification::judge() {
   }
 }
 
-void BristleIdentification::add_faults() {
+void BristleStudy::add_faults() {
   for (const auto* set : {&train_, &test_}) {
     for (const BristleRun& run : *set) {
       if (run.dropped * 50 <= run.size()) continue;
@@ -471,7 +474,7 @@ void BristleIdentification::add_faults() {
   }
 }
 
-void BristleIdentification::add_runs() {
+void BristleStudy::add_runs() {
   for (const auto* set : {&train_, &test_}) {
     for (const BristleSummary& s : summaries_of(model_, *set, set == &train_ ? learned_ : judged_)) {
       identification::BristleRun& run = *out().add_runs();
@@ -487,7 +490,7 @@ void BristleIdentification::add_runs() {
 }
 
 /// Errors over the horizon for the same runs, with the parameters fitted at one horizon.
-void BristleIdentification::add_horizon() {
+void BristleStudy::add_horizon() {
   identification::Horizon& horizon = *found_.mutable_horizon();
   for (const double ahead_s : {0.25, 0.5, 1.0, 2.0, 3.0, 5.0}) {
     const std::vector<BristleInstant> instants = instants_of(test_, ahead_s);
@@ -502,7 +505,7 @@ void BristleIdentification::add_horizon() {
   }
 }
 
-Identified BristleIdentification::result() {
+Identified BristleStudy::report() {
   out().set_noise_floor_mm(extrapolation_rmse_mm(judged_, options_.horizon_s));
   out().set_noise_floor_how(
       "the error of an extrapolation of the last half second, which needs no model; a model may be better");
@@ -541,13 +544,10 @@ void hold_out(std::vector<BristleRun>& train, std::vector<BristleRun>& test) {
 
 }  // namespace
 
-Identified identify_bristle(std::vector<BristleRun> train, std::vector<BristleRun> test, const Options& options) {
+std::unique_ptr<Study> bristle_study(std::vector<BristleRun> train, std::vector<BristleRun> test,
+                                     const Options& options) {
   if (test.empty()) hold_out(train, test);
-  BristleIdentification identification(train, test, options);
-  if (options.find_effects) identification.search();
-  identification.eliminate();
-  identification.judge();
-  return identification.result();
+  return std::make_unique<BristleStudy>(std::move(train), std::move(test), options);
 }
 
 }  // namespace kilotwin::bristle

@@ -2,13 +2,17 @@
 /// held-out runs.
 #pragma once
 
+#include <memory>
+#include <vector>
+
 #include "clients/identify/bristle/bristle_set.hpp"
-#include "clients/identify/identify.hpp"
+#include "clients/identify/study.hpp"
 
 namespace kilotwin::bristle {
 
-/// `test` empty: holds out every fourth run of `train`.
-[[nodiscard]] identify::Identified identify_bristle(std::vector<BristleRun> train, std::vector<BristleRun> test,
-                                                    const identify::Options&);
+/// The study of bristle plate tracks. `test` empty: holds out every fourth run of `train`. Throws UserError if no run is long enough.
+[[nodiscard]] std::unique_ptr<identify::Study> bristle_study(std::vector<BristleRun> train,
+                                                             std::vector<BristleRun> test,
+                                                             const identify::Options&);
 
 }  // namespace kilotwin::bristle

@@ -14,8 +14,6 @@
 #include "clients/identify/data/table_import.hpp"
 #include "core/base/error.hpp"
 #include "core/csv/csv_reader.hpp"
-#include "core/csv/csv_writer.hpp"
-#include "core/os/files.hpp"
 
 namespace kilotwin::identify {
 namespace fs = std::filesystem;
@@ -45,10 +43,6 @@ bool parse_finite(std::string_view cell, double& value) {
 bool is_table(const fs::path& file) {
   const std::string name = file.filename().string();
   return name.ends_with(".csv") || name.ends_with(".csv.gz");
-}
-
-std::string name_of_run(const fs::path& file) {
-  return (file.extension() == ".gz" ? file.stem() : file).stem().string();
 }
 
 /// ARK logs have no header, and their last row may be cut off.
@@ -85,7 +79,7 @@ std::vector<fs::path> importable(const fs::path& directory) {
   if (!fs::is_directory(directory, error) || has_trajectories(directory)) return files;
   for (const fs::directory_entry& entry : fs::directory_iterator(directory, error)) {
     const fs::path& file = entry.path();
-    if (!entry.is_regular_file(error) || name_of_run(file) == "commands") continue;
+    if (!entry.is_regular_file(error) || run_of_file(file) == "commands") continue;
     if ((is_ark_log(file) && looks_like_ark_log(file)) ||
         (is_table(file) && (looks_like_recording(file) || is_track_table(file))))
       files.push_back(file);
@@ -94,15 +88,15 @@ std::vector<fs::path> importable(const fs::path& directory) {
   return files;
 }
 
-std::string rows_of_ark_log(const fs::path& file) {
+void add_ark_log(const fs::path& file, SetBuilder& builder) {
   CsvReader csv(file, kArkLayout);
-  const std::string run = csv_cell(name_of_run(file));
-  std::string rows;
+  const std::string run = run_of_file(file);
+  bool has_rows = false;
   while (csv.next()) {
     double time_s = 0, x = 0, y = 0;
     std::uint32_t id = 0;
     // The line of column names above all rows.
-    if (rows.empty() && csv.cells() >= kArkColumns && !parse_finite(csv.text(kTime), time_s) &&
+    if (!has_rows && csv.cells() >= kArkColumns && !parse_finite(csv.text(kTime), time_s) &&
         !parse_finite(csv.text(kX), x))
       continue;
     if (csv.cells() < kArkColumns) {
@@ -117,27 +111,25 @@ std::string rows_of_ark_log(const fs::path& file) {
     if (!parse(csv.text(kId), id)) complain(kId, "id", "a whole number");
     if (!parse_finite(csv.text(kX), x)) complain(kX, "x", "pixels");
     if (!parse_finite(csv.text(kY), y)) complain(kY, "y", "pixels");
-    rows += fmt::format("{},{},{:.10g},{:.10g},{:.10g}\n", run, id, time_s, x - 0.5 * kArkMosaic_mm,
-                        0.5 * kArkMosaic_mm - y);
+    builder.add(run, id, {time_s, x - 0.5 * kArkMosaic_mm, 0.5 * kArkMosaic_mm - y, std::nan("")});
+    has_rows = true;
   }
-  if (rows.empty())
+  if (!has_rows)
     throw UserError(fmt::format(
         "{}: has no rows; an ARK log has t, id, colour, x, y, orientation, separated by tabs", file.string()));
-  return rows;
 }
 
-std::string rows_of_recording(const fs::path& file) {
+void add_recording(const fs::path& file, SetBuilder& builder) {
   CsvReader csv(file);
   const std::size_t time = csv.column("time_s"), robot = csv.column("robot"), x = csv.column("x_mm"),
                     y = csv.column("y_mm"), heading = csv.column("heading_rad");
-  const std::string run = csv_cell(name_of_run(file));
-  std::string rows;
+  const std::string run = run_of_file(file);
+  bool has_rows = false;
   while (csv.next()) {
-    rows += fmt::format("{},{},{:.10g},{:.10g},{:.10g},{:.10g}\n", run, csv.whole(robot), csv.number(time),
-                        csv.number(x), csv.number(y), csv.number(heading));
+    builder.add(run, csv.whole(robot), {csv.number(time), csv.number(x), csv.number(y), csv.number(heading)});
+    has_rows = true;
   }
-  if (rows.empty()) throw UserError(fmt::format("{}: has no rows", file.string()));
-  return rows;
+  if (!has_rows) throw UserError(fmt::format("{}: has no rows", file.string()));
 }
 
 namespace {
@@ -149,58 +141,39 @@ Kind kind_of(const fs::path& file) {
   return is_track_table(file) ? Kind::kTrackTable : Kind::kRecording;
 }
 
-std::string rows_of(const fs::path& file, Kind kind) {
+void add_file(const fs::path& file, Kind kind, SetBuilder& builder) {
   switch (kind) {
-    case Kind::kArkLog: return rows_of_ark_log(file);
-    case Kind::kTrackTable: return rows_of_track_table(file);
-    case Kind::kRecording: break;
+    case Kind::kArkLog: return add_ark_log(file, builder);
+    case Kind::kTrackTable: return add_track_table(file, builder);
+    case Kind::kRecording: return add_recording(file, builder);
   }
-  return rows_of_recording(file);
 }
 
-}  // namespace
-
-void import_set(const fs::path& from, const fs::path& to) {
-  const std::vector<fs::path> files = importable(from);
-  if (files.empty()) {
-    throw UserError(
-        fmt::format("{}: holds neither trajectories.csv, nor ARK logs (*.tsv, *.txt, *.log), nor recordings "
-                    "(*.csv of kilotwin export --trajectories), nor tables of kilotwin track",
-                    from.string()));
-  }
+MeasuredSet imported(const fs::path& directory, const std::vector<fs::path>& files) {
   const Kind kind = kind_of(files.front());
   std::map<std::string, fs::path> runs;
-  std::string text;
+  SetBuilder builder;
   for (const fs::path& file : files) {
     if (kind_of(file) != kind) {
       throw UserError(fmt::format(
           "{}: is of another kind than {}; give ARK logs, recordings or tables of kilotwin track, not both",
           file.string(), files.front().filename().string()));
     }
-    const auto [known, fresh] = runs.emplace(name_of_run(file), file);
+    const auto [known, fresh] = runs.emplace(run_of_file(file), file);
     if (!fresh)
       throw UserError(fmt::format("{}: names the same run as {}; rename one", file.string(),
                                   known->second.filename().string()));
-    text += rows_of(file, kind);
+    add_file(file, kind, builder);
   }
-  std::error_code error;
-  fs::create_directories(to, error);
-  os::write_file(to / "trajectories.csv", (kind != Kind::kRecording ? "run,robot,time_s,x_mm,y_mm\n"
-                                                                    : "run,robot,time_s,x_mm,y_mm,heading_rad\n") +
-                                              text);
-  for (const char* name : {"commands.csv", "commands.csv.gz"}) {
-    fs::remove(to / name, error);
-    if (fs::exists(from / name, error)) os::write_file(to / name, os::read_file(from / name));
-  }
+  builder.add_commands(directory);
+  return builder.finish();
 }
-
-namespace {
 
 /// Names of the runs whose robots are known by their tracks only.
 std::set<std::string> unnumbered_runs(const std::vector<fs::path>& files) {
   std::set<std::string> runs;
   for (const fs::path& file : files)
-    if (kind_of(file) == Kind::kTrackTable && !CsvReader(file).find_column("robot")) runs.insert(name_of_run(file));
+    if (kind_of(file) == Kind::kTrackTable && !CsvReader(file).find_column("robot")) runs.insert(run_of_file(file));
   return runs;
 }
 
@@ -224,23 +197,19 @@ void number_tracks(MeasuredSet& set, const std::set<std::string>& runs, std::uin
 
 }  // namespace
 
-std::uint32_t first_number_beside(const fs::path& directory, const fs::path& other, const fs::path& converted) {
+std::uint32_t first_number_beside(const fs::path& directory, const fs::path& other) {
   if (unnumbered_runs(importable(directory)).empty()) return 0;
   const std::vector<fs::path> files = importable(other);
-  if (!files.empty()) import_set(other, converted);
-  const MeasuredSet set = load_measured_set(files.empty() ? other : converted);
+  const MeasuredSet set = files.empty() ? load_measured_set(other) : imported(other, files);
   return first_free_number(set, unnumbered_runs(files));
 }
 
-MeasuredSet load_or_import(const fs::path& directory, const fs::path& converted, std::uint32_t first_number) {
+MeasuredSet load_or_import(const fs::path& directory, std::uint32_t first_number) {
   const std::vector<fs::path> files = importable(directory);
   if (files.empty()) return load_measured_set(directory);
-  import_set(directory, converted);
-  MeasuredSet set = load_measured_set(converted);
+  MeasuredSet set = imported(directory, files);
   const std::set<std::string> unnumbered = unnumbered_runs(files);
-  if (unnumbered.empty()) return set;
-  number_tracks(set, unnumbered, first_number);
-  save_measured_set(set, converted);
+  if (!unnumbered.empty()) number_tracks(set, unnumbered, first_number);
   return set;
 }
 

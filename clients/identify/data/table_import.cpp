@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <optional>
 #include <set>
@@ -14,9 +13,8 @@
 
 #include "core/base/error.hpp"
 #include "core/base/pose.hpp"
+#include "core/base/utf8.hpp"
 #include "core/csv/csv_reader.hpp"
-#include "core/csv/csv_writer.hpp"
-#include "core/os/files.hpp"
 #include "core/stats/quantiles.hpp"
 
 namespace kilotwin::identify {
@@ -25,14 +23,22 @@ namespace {
 
 constexpr std::string_view kColumnsExample = "time=t,robot=ID,x=px,y=py,heading=theta";
 
-std::string run_of_file(const fs::path& file) {
-  return csv_cell((file.extension() == ".gz" ? file.stem() : file).stem().string());
+/// Whether the ending is that of a table.
+bool is_table(const fs::path& file) {
+  const std::string ending = (file.extension() == ".gz" ? file.stem() : file).extension().string();
+  return ending == ".csv" || ending == ".tsv";
 }
 
-std::string row_of(const std::string& run, std::uint32_t robot, double time_s, double x_mm, double y_mm,
-                   double heading_rad) {
-  return fmt::format("{},{},{:.10g},{:.10g},{:.10g},{}\n", run, robot, time_s, x_mm, y_mm,
-                     std::isnan(heading_rad) ? std::string() : fmt::format("{:.10g}", heading_rad));
+/// The tables of a directory but its commands, sorted.
+std::vector<fs::path> tables_of(const fs::path& directory) {
+  std::error_code error;
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(directory, error)) {
+    const fs::path& file = entry.path();
+    if (is_table(file) && !file.filename().string().starts_with("commands.csv")) files.push_back(file);
+  }
+  std::sort(files.begin(), files.end());
+  return files;
 }
 
 /// The column of that name. Throws UserError that says how to name another one.
@@ -44,7 +50,7 @@ std::size_t named(const CsvReader& csv, const fs::path& file, const char* key, c
                               there, key));
 }
 
-std::string rows_of_table(const fs::path& file, const TableFormat& format) {
+void add_table(const fs::path& file, const TableFormat& format, SetBuilder& builder) {
   CsvReader csv(file);
   const std::size_t time = named(csv, file, "time", format.time), robot = named(csv, file, "robot", format.robot),
                     x = named(csv, file, "x", format.x), y = named(csv, file, "y", format.y);
@@ -53,15 +59,14 @@ std::string rows_of_table(const fs::path& file, const TableFormat& format) {
   if (!format.run.empty()) run = named(csv, file, "run", format.run);
   const double up = format.image ? -1 : 1, angle = up * (format.degrees ? M_PI / 180 : 1);
   const std::string of_file = run_of_file(file);
-  std::string rows;
   while (csv.next()) {
     const double x_units = csv.number_or_nan(x), y_units = csv.number_or_nan(y);
     if (std::isnan(x_units) || std::isnan(y_units)) continue;  // the tracker lost the robot
-    rows += row_of(run ? csv_cell(std::string(csv.text(*run))) : of_file, csv.whole(robot),
-                   format.unit_s * csv.number(time), format.unit_mm * x_units, up * format.unit_mm * y_units,
-                   heading ? angle * csv.number_or_nan(*heading) : std::numeric_limits<double>::quiet_NaN());
+    if (run && !is_utf8(csv.text(*run))) csv.complain(*run, "run is not UTF-8; save the table as UTF-8");
+    builder.add(run ? csv.text(*run) : of_file, csv.whole(robot),
+                {format.unit_s * csv.number(time), format.unit_mm * x_units, up * format.unit_mm * y_units,
+                 heading ? angle * csv.number_or_nan(*heading) : std::numeric_limits<double>::quiet_NaN()});
   }
-  return rows;
 }
 
 /// A row of a table of `kilotwin track`: one robot in one frame.
@@ -112,40 +117,28 @@ void set_columns(TableFormat& format, const std::string& text) {
   }
 }
 
-void import_tables(const fs::path& from, const fs::path& to, const TableFormat& format) {
-  std::error_code error;
-  std::vector<fs::path> files;
-  for (const fs::directory_entry& entry : fs::directory_iterator(from, error)) {
-    const std::string name = entry.path().filename().string();
-    if (!name.starts_with("commands.csv") && (name.ends_with(".csv") || name.ends_with(".csv.gz")))
-      files.push_back(entry.path());
-  }
+MeasuredSet read_tables(const fs::path& directory, const TableFormat& format) {
+  const std::vector<fs::path> files = tables_of(directory);
   if (files.empty())
-    throw UserError(
-        fmt::format("{}: holds no table (*.csv); give a directory with the tracker's tables", from.string()));
-  std::sort(files.begin(), files.end());
-  std::string rows;
+    throw UserError(fmt::format("{}: holds no table (*.csv, *.tsv); give a directory with the tracker's tables",
+                                directory.string()));
+  SetBuilder builder;
   std::set<std::string> runs;
   for (const fs::path& file : files) {
     if (format.run.empty() && !runs.insert(run_of_file(file)).second)
       throw UserError(fmt::format("{}: names the same run as another table; rename one", file.string()));
-    rows += rows_of_table(file, format);
+    add_table(file, format, builder);
   }
-  if (rows.empty()) throw UserError(fmt::format("{}: the tables have no rows", from.string()));
-  fs::create_directories(to, error);
-  os::write_file(to / "trajectories.csv", "run,robot,time_s,x_mm,y_mm,heading_rad\n" + rows);
-  for (const char* name : {"commands.csv", "commands.csv.gz"})
-    if (fs::exists(from / name, error)) os::write_file(to / name, os::read_file(from / name));
+  builder.add_commands(directory);
+  MeasuredSet set = builder.finish();
+  if (set.samples() == 0) throw UserError(fmt::format("{}: the tables have no rows", directory.string()));
+  return set;
 }
 
 bool has_headings(const fs::path& directory) {
-  std::error_code error;
-  const fs::directory_iterator files(directory, error);
-  return std::any_of(begin(files), end(files), [](const fs::directory_entry& entry) {
-    const std::string name = entry.path().filename().string();
-    return (name.ends_with(".csv") || name.ends_with(".csv.gz")) &&
-           CsvReader(entry.path()).find_column("heading_rad").has_value();
-  });
+  const std::vector<fs::path> files = tables_of(directory);
+  return std::any_of(files.begin(), files.end(),
+                     [](const fs::path& file) { return CsvReader(file).find_column("heading_rad").has_value(); });
 }
 
 bool is_track_table(const fs::path& file) {
@@ -158,7 +151,7 @@ bool is_track_table(const fs::path& file) {
   }
 }
 
-std::string rows_of_track_table(const fs::path& file) {
+void add_track_table(const fs::path& file, SetBuilder& builder) {
   bool calibrated = false;
   const std::vector<TrackedRow> rows = tracked_rows(file, calibrated);
   if (rows.empty()) throw UserError(fmt::format("{}: shows no robot", file.string()));
@@ -177,11 +170,10 @@ std::string rows_of_track_table(const fs::path& file) {
     up = -1;  // y of a picture points down
   }
   const std::string run = run_of_file(file);
-  std::string text;
   for (const TrackedRow& row : rows)
-    text += fmt::format("{},{},{:.10g},{:.10g},{:.10g}\n", run, row.robot, row.time_s, unit_mm * (row.x - x_middle),
-                        up * unit_mm * (row.y - y_middle));
-  return text;
+    builder.add(run, row.robot,
+                {row.time_s, unit_mm * (row.x - x_middle), up * unit_mm * (row.y - y_middle),
+                 std::numeric_limits<double>::quiet_NaN()});
 }
 
 }  // namespace kilotwin::identify

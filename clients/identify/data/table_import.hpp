@@ -1,8 +1,10 @@
-/// Tables of any tracker as rows of trajectories.csv.
+/// Tables of any tracker as a measured set.
 #pragma once
 
 #include <filesystem>
 #include <string>
+
+#include "clients/identify/data/set_builder.hpp"
 
 namespace kilotwin::identify {
 
@@ -20,18 +22,18 @@ struct TableFormat {
 /// Sets the names by "time=t,robot=ID,x=px,y=py,heading=theta,run=trial"; names that are left out stay. Throws UserError.
 void set_columns(TableFormat&, const std::string& text);
 
-/// Writes to/trajectories.csv from all *.csv[.gz] in a directory but commands.csv, which it copies. Throws UserError.
-void import_tables(const std::filesystem::path& from, const std::filesystem::path& to, const TableFormat&);
+/// Reads all tables in a directory (*.csv[.gz], *.tsv[.gz]) and its commands.csv[.gz]. Throws UserError.
+[[nodiscard]] MeasuredSet read_tables(const std::filesystem::path& directory, const TableFormat&);
 
 /// Whether some table of a directory has the column heading_rad.
 [[nodiscard]] bool has_headings(const std::filesystem::path& directory);
 
 /// Whether a file is a table of `kilotwin track`.
 [[nodiscard]] bool is_track_table(const std::filesystem::path& file);
-/// `run,robot,time_s,x_mm,y_mm` rows of such a table, without a header. Headings are left out: the tracker filters them
+/// Adds the rows of such a table, as those of the run that is named after the file. Headings are left out: the tracker filters them
 /// from the positions by a model without drift, so they follow the direction of motion, and are no second measurement.
 /// Without a calibration the scale follows from the radius of the discs, 16.5 mm, and the origin is the middle of what
-/// the robots visited. Robots without a number of their own are numbered by their tracks.
-[[nodiscard]] std::string rows_of_track_table(const std::filesystem::path& file);
+/// the robots visited. Robots without a number of their own are numbered by their tracks. Throws UserError.
+void add_track_table(const std::filesystem::path& file, SetBuilder&);
 
 }  // namespace kilotwin::identify

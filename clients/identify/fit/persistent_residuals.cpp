@@ -80,4 +80,10 @@ Noise white_part(const Noise& noise, double persistent_share) {
   return white;
 }
 
+FitState with_white_noise(const Fitter& fitter, const FitState& fit) {
+  FitState white = fit;
+  white.model.noise = white_part(fit.model.noise, persistent_share(fitter, fit));
+  return white;
+}
+
 }  // namespace kilotwin::identify

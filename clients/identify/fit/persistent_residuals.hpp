@@ -15,5 +15,7 @@ namespace kilotwin::identify {
 
 /// The noise without a share of its process variance.
 [[nodiscard]] Noise white_part(const Noise&, double persistent_share);
+/// The model as it would be if only the white part of its process noise were noise: it expects smaller errors of itself.
+[[nodiscard]] FitState with_white_noise(const Fitter&, const FitState&);
 
 }  // namespace kilotwin::identify

@@ -128,6 +128,8 @@ class SpellFilter {
       for (std::ptrdiff_t n = h.node; n >= 0; n = nodes_[static_cast<std::size_t>(n)].parent)
         out.share[--i] += static_cast<float>(weight * nodes_[static_cast<std::size_t>(n)].share);
     }
+    // The sum of the weights may round to more than 1, and the variance of such a share would be negative.
+    for (float& share : out.share) share = std::min(share, 1.0F);
     add_spells(out);
     return out;
   }

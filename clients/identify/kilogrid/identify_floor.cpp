@@ -22,7 +22,7 @@
 namespace kilotwin::kilogrid {
 namespace {
 
-using identify::Identified, identify::Options, identify::assign;
+using identify::Identified, identify::Options, identify::Study, identify::assign;
 using JsonFields = google::protobuf::Map<std::string, identify::JsonValue>;
 using identify::json_list, identify::json_null, identify::json_value;
 
@@ -141,24 +141,20 @@ struct FloorStage {
   FloorModel model;
 };
 
-/// One identification, in the order of its public functions.
-class FloorIdentification {
+class FloorStudy final : public Study {
  public:
-  FloorIdentification(FloorDays days, const Options& options)
-      : options_(options),
+  FloorStudy(FloorDays days, Options options, std::filesystem::path ledger)
+      : options_(std::move(options)),
+        record_(std::move(ledger)),
         days_(without_unlike_runs(std::move(days))),
-        learned_(days_.fit, floor_, options.threads),
-        choosing_(days_.choose, floor_, options.threads),
-        held_out_(days_.report, floor_, options.threads) {}
+        learned_(days_.fit, floor_, options_.threads),
+        choosing_(days_.choose, floor_, options_.threads),
+        held_out_(days_.report, floor_, options_.threads) {}
 
-  void fit_base();
-  void search();
-  /// Chooses among the models of the search by the days that choose, and refits the chosen one to these days too.
-  void choose();
-  /// Errors of both models, and of the model without each effect. From here on the reported days are open.
-  void judge(const OpenedDays&);
-  void compare_with_days();
-  [[nodiscard]] Identified result();
+  void fit() override;
+  void search() override;
+  void judge() override;
+  Identified report() override;
 
  private:
   [[nodiscard]] identification::Result& out() { return *found_.mutable_result(); }
@@ -174,6 +170,11 @@ class FloorIdentification {
     return [this](const std::string& what) { say(what); };
   }
   FloorDays without_unlike_runs(FloorDays);
+  /// Chooses among the models of the search by the days that choose, and refits the chosen one to these days too.
+  void choose();
+  /// Errors of both models, and of the model without each effect. From here on the reported days are open.
+  void predict();
+  void compare_with_days();
   void drop(const std::vector<std::string>& kept);
   void refit();
   void add_caveats(const OpenedDays::Opened&);
@@ -186,7 +187,8 @@ class FloorIdentification {
   void add_base();
   [[nodiscard]] identification::Estimate number(std::size_t parameter) const;
 
-  const Options& options_;
+  const Options options_;
+  const OpenedDays record_;
   const Floor floor_;
   identification::Identification found_;
   std::string stage_;
@@ -202,7 +204,7 @@ class FloorIdentification {
 };
 
 /// An unlike day is reported, and neither fits nor chooses: its conditions need not recur.
-FloorDays FloorIdentification::without_unlike_runs(FloorDays days) {
+FloorDays FloorStudy::without_unlike_runs(FloorDays days) {
   for (const auto* runs : {&days.fit, &days.report}) add_faults(out(), *runs);
   if (!days.chose_on_reported) add_faults(out(), days.choose);
   const std::size_t fitted = days.fit.size();
@@ -236,7 +238,7 @@ FloorDays FloorIdentification::without_unlike_runs(FloorDays days) {
 }
 
 /// On the days that choose: the reported days stay closed during the search.
-void FloorIdentification::note(const std::string& added, const FloorModel& model) {
+void FloorStudy::note(const std::string& added, const FloorModel& model) {
   const double misfit = choosing_.misfit(simulated_statistics(choosing_, model.settings(), 4711));
   identification::Step& step = *found_.add_steps();
   step.set_added(added);
@@ -245,16 +247,16 @@ void FloorIdentification::note(const std::string& added, const FloorModel& model
   say(fmt::format("{}: misfit on the days that choose {:.0f}, {} statistics", added, misfit, choosing_.size()));
 }
 
-void FloorIdentification::fit_base() {
+void FloorStudy::fit() {
   begin(kBase, "base model");
   base_.add(base_term());
   fit_from_far_start(base_, learned_, 1, progress());
-  fit(base_, learned_, 2, 1, 1, progress());
+  kilogrid::fit(base_, learned_, 2, 1, 1, progress());
   model_ = base_;
   note("base", base_);
 }
 
-void FloorIdentification::search() {
+void FloorStudy::search() {
   FloorFound found = search_effects(
       base_, learned_, candidate_terms(floor_), options_.progress ? options_.progress : [](const stats::Work&) {},
       [&](const std::string& added, const FloorModel& model) { note(added, model); });
@@ -271,7 +273,7 @@ void FloorIdentification::search() {
   }
 }
 
-void FloorIdentification::choose() {
+void FloorStudy::choose() {
   begin(kChoice, "last check");
   // Without elimination and without walls it is the last model already.
   if (model_.values != path_.back().model.values || names_of(model_) != path_.back().effects)
@@ -300,7 +302,7 @@ void FloorIdentification::choose() {
 }
 
 /// Effects of the search that are not written leave the findings, except that they were dropped.
-void FloorIdentification::drop(const std::vector<std::string>& kept) {
+void FloorStudy::drop(const std::vector<std::string>& kept) {
   for (std::size_t e = 0; e < effects_of(model_); ++e) {
     const std::string name = name_of(model_, e);
     if (std::find(kept.begin(), kept.end(), name) != kept.end()) continue;
@@ -322,27 +324,26 @@ void FloorIdentification::drop(const std::vector<std::string>& kept) {
 }
 
 /// The days that choose are days of the fit once they have chosen.
-void FloorIdentification::refit() {
+void FloorStudy::refit() {
   std::vector<FloorRun> all = days_.fit;
   all.insert(all.end(), days_.choose.begin(), days_.choose.end());
   const FloorTarget target(all, floor_, options_.threads);
-  fit(base_, target, 1, 0.5, 400, progress());
+  kilogrid::fit(base_, target, 1, 0.5, 400, progress());
   if (effects_of(model_) > 0)
-    fit(model_, target, 1, 0.5, 400, progress());
+    kilogrid::fit(model_, target, 1, 0.5, 400, progress());
   else
     model_ = base_;
   errors_ = standard_errors(model_, target, kErrorsSeed);
 }
 
-JudgedModel FloorIdentification::judged(const FloorModel& model, std::uint64_t seed,
-                                        std::vector<Predicted>& to) const {
+JudgedModel FloorStudy::judged(const FloorModel& model, std::uint64_t seed, std::vector<Predicted>& to) const {
   JudgedModel out{validate(days_.report, floor_, model.settings(), options_.horizon_s, options_.threads, &to),
                   simulated_statistics(held_out_, model.settings(), seed, 2), 0};
   out.misfit = held_out_.misfit(out.statistics);
   return out;
 }
 
-void FloorIdentification::add_parameters(std::size_t e, JsonFields& parameters) const {
+void FloorStudy::add_parameters(std::size_t e, JsonFields& parameters) const {
   if (name_of(model_, e) == kWallEffect) {
     parameters["form"] = json_value("steps");
     parameters["beside_mm"] = json_value(FloorModel::kBeside_mm);
@@ -356,7 +357,7 @@ void FloorIdentification::add_parameters(std::size_t e, JsonFields& parameters) 
 }
 
 /// A parameter with its 95 % interval. An interval as wide as the range that the parameter may have says nothing.
-identification::Estimate FloorIdentification::number(std::size_t parameter) const {
+identification::Estimate FloorStudy::number(std::size_t parameter) const {
   const FloorParameter of = model_.parameters()[parameter];
   const double value = model_.values[parameter], half = stats::kNormal95 * errors_[parameter];
   identification::Estimate out;
@@ -372,7 +373,7 @@ identification::Estimate FloorIdentification::number(std::size_t parameter) cons
   return out;
 }
 
-identification::Effect FloorIdentification::judged_effect(std::size_t e) {
+identification::Effect FloorStudy::judged_effect(std::size_t e) {
   const FloorModel less = without(model_, e);
   const std::string name = name_of(model_, e);
   const bool is_wall = name == kWallEffect;
@@ -409,7 +410,7 @@ identification::Effect FloorIdentification::judged_effect(std::size_t e) {
   return effect;
 }
 
-void FloorIdentification::add_ambiguities() {
+void FloorStudy::add_ambiguities() {
   const auto add = [&](const std::string& found, const char* instead, const std::string& experiment) {
     identification::Ambiguous& ambiguous = *out().add_ambiguous();
     ambiguous.set_found(found);
@@ -426,7 +427,7 @@ void FloorIdentification::add_ambiguities() {
 }
 
 /// Adds the caveats of the errors, for readers.
-void FloorIdentification::add_caveats(const OpenedDays::Opened& opened) {
+void FloorStudy::add_caveats(const OpenedDays::Opened& opened) {
   std::vector<std::string> sentences;
   if (days_.chose_on_reported)
     sentences.emplace_back(
@@ -465,11 +466,11 @@ std::string today() {
   return fmt::format("{:%Y-%m-%d}", std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now()));
 }
 
-void FloorIdentification::judge(const OpenedDays& record) {
+void FloorStudy::predict() {
   begin(kPredictions, "predictions");
   const OpenedDays::Opened opened =
-      record.open(days_.report, days_.searched(),
-                  fmt::format("horizon {} s, effects {}", options_.horizon_s, options_.find_effects), today());
+      record_.open(days_.report, days_.searched(),
+                   fmt::format("horizon {} s, effects {}", options_.horizon_s, options_.find_effects), today());
   if (errors_.empty()) errors_ = standard_errors(model_, learned_, kErrorsSeed);
   before_ = judged(base_, 78, by_base_);
   after_ = judged(model_, 79, by_model_);
@@ -488,7 +489,7 @@ void FloorIdentification::judge(const OpenedDays& record) {
   add_caveats(opened);
 }
 
-void FloorIdentification::add_statistics() {
+void FloorStudy::add_statistics() {
   std::vector<double> sd(statistic_count());
   for (std::size_t s = 0; s < sd.size(); ++s) sd[s] = std::sqrt(held_out_.tolerance()[s]);
   for (const StatisticGroup& group : statistic_groups()) {
@@ -506,7 +507,7 @@ void FloorIdentification::add_statistics() {
   }
 }
 
-void FloorIdentification::compare_with_days() {
+void FloorStudy::compare_with_days() {
   begin(kClassifier, "classifier");
   add_statistics();
   std::vector<FloorRun> alike = days_.fit;
@@ -519,7 +520,7 @@ void FloorIdentification::compare_with_days() {
 }
 
 /// The first four parameters of the base term belong to the drive, the others to the reception of cells.
-void FloorIdentification::add_base() {
+void FloorStudy::add_base() {
   identification::Base& base = *out().mutable_base();
   base.set_straight_speed_mm_s(model_.values[0]);
   base.set_turn_speed_mm_s(model_.values[1]);
@@ -532,7 +533,7 @@ void FloorIdentification::add_base() {
   floor["cell_later"] = json_value(json_list(model_.settings().radio.later));
 }
 
-Identified FloorIdentification::result() {
+Identified FloorStudy::report() {
   const FloorSettings settings = model_.settings();
   out().set_noise_floor_mm(cell_noise_mm(floor_, settings.radio));
   out().set_noise_floor_how(
@@ -555,17 +556,17 @@ Identified FloorIdentification::result() {
   return identified;
 }
 
+void FloorStudy::judge() {
+  choose();
+  predict();
+  compare_with_days();
+}
+
 }  // namespace
 
-Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> test, const Options& options,
-                          const std::filesystem::path& opened_days) {
-  FloorIdentification identification(divided(std::move(train), std::move(test)), options);
-  identification.fit_base();
-  if (options.find_effects) identification.search();
-  identification.choose();
-  identification.judge(OpenedDays(opened_days));
-  identification.compare_with_days();
-  return identification.result();
+std::unique_ptr<Study> floor_study(std::vector<FloorRun> train, std::vector<FloorRun> test, const Options& options,
+                                   std::filesystem::path ledger) {
+  return std::make_unique<FloorStudy>(divided(std::move(train), std::move(test)), options, std::move(ledger));
 }
 
 }  // namespace kilotwin::kilogrid

@@ -4,16 +4,18 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <vector>
 
-#include "clients/identify/identify.hpp"
 #include "clients/identify/kilogrid/floor_log.hpp"
+#include "clients/identify/study.hpp"
 
 namespace kilotwin::kilogrid {
 
-/// `test` empty: holds out every third run of `train`. `ledger`: where openings of reported days are noted; empty: nowhere.
-[[nodiscard]] identify::Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> test,
-                                                  const identify::Options&,
-                                                  const std::filesystem::path& ledger = {});
+/// The study of Kilogrid runs. `test` empty: holds out every third run of `train`. `ledger`: where openings of reported days are noted;
+/// empty: nowhere.
+[[nodiscard]] std::unique_ptr<identify::Study> floor_study(std::vector<FloorRun> train, std::vector<FloorRun> test,
+                                                           const identify::Options&,
+                                                           std::filesystem::path ledger = {});
 
 }  // namespace kilotwin::kilogrid

@@ -165,9 +165,13 @@ std::string words_of(const Unexplained& u, const Gap& gap, const Comparison* exc
 }  // namespace
 
 bool leaves_systematic_error(const MeasuredSet& set, const std::vector<Window>& known,
-                             const PredictionErrors& errors, std::uint32_t threads) {
+                             const PredictionErrors& errors, const std::optional<Replicates>& replicates,
+                             std::uint32_t threads) {
   if (errors.rows == 0) return false;
   if (errors.rmse_mm() > kLargeErrorRatio * errors.expected_mm()) return true;
+  if (replicates &&
+      std::hypot(replicates->repeatable_mm, replicates->floor_mm) > kLargeErrorRatio * replicates->floor_mm)
+    return true;
   const std::optional<LearnerCheck> learner = learner_check(set, known, {}, threads);
   return learner && learner->predicted_mm() > 0;
 }

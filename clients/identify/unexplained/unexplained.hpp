@@ -48,8 +48,10 @@ struct Unexplained {
                                            const std::optional<Replicates>& replicates, std::uint32_t threads,
                                            const Stretches& = {});
 
-/// Whether a model leaves a systematic error of the data of its own fit: `known` are its windows, `errors` its errors there.
+/// Whether a model leaves a systematic error of the data of its own fit: `known` are its windows, `errors` its errors there, and
+/// `replicates` of the same forecasts.
 [[nodiscard]] bool leaves_systematic_error(const MeasuredSet&, const std::vector<Window>& known,
-                                           const PredictionErrors& errors, std::uint32_t threads);
+                                           const PredictionErrors& errors,
+                                           const std::optional<Replicates>& replicates, std::uint32_t threads);
 
 }  // namespace kilotwin::identify

@@ -27,21 +27,17 @@ class ImportTest : public testing::Test {
                  std::string(testing::UnitTest::GetInstance()->current_test_info()->name()))) {
     fs::remove_all(folder_);
     fs::create_directories(folder_ / "from");
-    fs::create_directories(folder_ / "to");
   }
   ~ImportTest() override { fs::remove_all(folder_); }
 
   void give(const std::string& name, const std::string& content) {
     os::write_file(folder_ / "from" / name, content);
   }
-  MeasuredSet imported() {
-    import_set(folder_ / "from", folder_ / "to");
-    return load_measured_set(folder_ / "to");
-  }
+  MeasuredSet imported() { return load_or_import(folder_ / "from"); }
   /// The message of the import's error.
   std::string complaint() {
     try {
-      import_set(folder_ / "from", folder_ / "to");
+      (void)imported();
     } catch (const UserError& error) {
       return error.what();
     }
@@ -84,8 +80,7 @@ TEST_F(ImportTest, TablesOfAnyTrackerByNamesUnitsAndAxes) {
   format.unit_mm = 1000;
   format.unit_s = 0.001;
   format.degrees = format.image = true;
-  import_tables(folder_ / "from", folder_ / "to", format);
-  const MeasuredSet set = load_measured_set(folder_ / "to");
+  const MeasuredSet set = read_tables(folder_ / "from", format);
   ASSERT_EQ(set.tracks(), 2U);
   EXPECT_TRUE(set.has_commands);
   EXPECT_EQ(set.runs[0].name, "trial");
@@ -104,7 +99,7 @@ TEST_F(ImportTest, NamesOfColumnsThatAreNoneAreReported) {
   EXPECT_THROW(set_columns(format, "time="), UserError);
   give("trial.csv", "id,t,x,y\n1,0,0,0\n");
   try {
-    import_tables(folder_ / "from", folder_ / "to", {});
+    (void)read_tables(folder_ / "from", {});
     FAIL();
   } catch (const UserError& error) {
     EXPECT_NE(std::string(error.what()).find("only id, t, x, y; name it: --columns time=NAME"), std::string::npos)
@@ -133,10 +128,11 @@ TEST_F(ImportTest, TracksWithoutRobotsAreOtherRobotsInEachFilm) {
   give("two.csv", head + rows);
   give("commands.csv", "run,robot,time_s,motion\none,4,0,left\ntwo,0,0,right\n");
   for (const std::uint32_t first : {0U, 7U}) {
-    const MeasuredSet set = load_or_import(folder_ / "from", folder_ / "to", first);
+    const MeasuredSet set = load_or_import(folder_ / "from", first);
     EXPECT_EQ(set.robots(), (std::vector<std::uint32_t>{first, first + 1, first + 2, first + 3}));
     EXPECT_EQ(set.runs[0].tracks[1].commands.back().motion, Motion::kLeft);
     EXPECT_EQ(set.runs[1].tracks[0].commands.back().motion, Motion::kRight);
+    save_measured_set(set, folder_ / "to");
     const MeasuredSet again = load_measured_set(folder_ / "to");
     EXPECT_EQ(again.robots(), set.robots());
     EXPECT_EQ(again.runs[0].tracks[1].commands.back().motion, Motion::kLeft);
@@ -145,7 +141,7 @@ TEST_F(ImportTest, TracksWithoutRobotsAreOtherRobotsInEachFilm) {
   give("one.csv", head + ",robot\n0,0,0,100,50,11,nan,off,12\n");
   give("two.csv", head + ",robot\n0,0,0,100,50,11,nan,off,12\n");
   fs::remove(folder_ / "from" / "commands.csv");
-  EXPECT_EQ(load_or_import(folder_ / "from", folder_ / "to", 7).robots(), (std::vector<std::uint32_t>{12}));
+  EXPECT_EQ(load_or_import(folder_ / "from", 7).robots(), (std::vector<std::uint32_t>{12}));
 }
 
 TEST_F(ImportTest, TracksWithoutRobotsAreNoRobotsOfANumberedTestSet) {
@@ -153,12 +149,11 @@ TEST_F(ImportTest, TracksWithoutRobotsAreNoRobotsOfANumberedTestSet) {
   const fs::path test = folder_ / "test";
   fs::create_directories(test);
   os::write_file(test / "trajectories.csv", "run,robot,time_s,x_mm,y_mm\na,0,0,1,2\na,5,0,30,2\n");
-  const std::uint32_t first = first_number_beside(folder_ / "from", test, folder_ / "converted");
+  const std::uint32_t first = first_number_beside(folder_ / "from", test);
   EXPECT_EQ(first, 6U);
-  EXPECT_EQ(load_or_import(folder_ / "from", folder_ / "to", first).robots(), (std::vector<std::uint32_t>{6}));
-  EXPECT_EQ(first_number_beside(folder_ / "from", folder_ / "from", folder_ / "converted"), 0U)
-      << "the test set numbers none";
-  EXPECT_EQ(first_number_beside(test, test, folder_ / "converted"), 0U) << "all tracks have numbers";
+  EXPECT_EQ(load_or_import(folder_ / "from", first).robots(), (std::vector<std::uint32_t>{6}));
+  EXPECT_EQ(first_number_beside(folder_ / "from", folder_ / "from"), 0U) << "the test set numbers none";
+  EXPECT_EQ(first_number_beside(test, test), 0U) << "all tracks have numbers";
 }
 
 TEST_F(ImportTest, RecordingsWithHeadingsAndCommands) {
@@ -195,11 +190,11 @@ TEST_F(ImportTest, NamesTheWrongLine) {
 }
 
 TEST_F(ImportTest, RefusesAmbiguousAndEmptyDirectories) {
-  EXPECT_NE(complaint().find("holds neither"), std::string::npos);
+  EXPECT_NE(complaint().find("holds no trajectories.csv"), std::string::npos);
   give("README.txt", "Robots on a table.\nt\tid\n");
   give("other.csv", "a,b\n1,2\n");
   give("empty.log", "");
-  EXPECT_NE(complaint().find("holds neither"), std::string::npos);
+  EXPECT_NE(complaint().find("other.csv"), std::string::npos);
   give("a.txt", "0\t1\t0\t5\t5\t0\n");
   give("a.tsv", "0\t1\t0\t5\t5\t0\n");
   EXPECT_NE(complaint().find("the same run"), std::string::npos);
@@ -232,12 +227,13 @@ TEST_F(ImportTest, AnyFileIsReadOrRefused) {
     const std::string name = is_ark ? "f.txt" : "f.csv";
     give(name, content);
     try {
-      const std::string rows =
-          is_ark ? rows_of_ark_log(folder_ / "from" / name) : rows_of_recording(folder_ / "from" / name);
+      SetBuilder builder;
+      if (is_ark)
+        add_ark_log(folder_ / "from" / name, builder);
+      else
+        add_recording(folder_ / "from" / name, builder);
       // A file that is accepted yields valid rows.
-      os::write_file(folder_ / "to" / "trajectories.csv",
-                     (is_ark ? "run,robot,time_s,x_mm,y_mm\n" : "run,robot,time_s,x_mm,y_mm,heading_rad\n") + rows);
-      const MeasuredSet set = load_measured_set(folder_ / "to");
+      const MeasuredSet set = builder.finish();
       for (const Track& track : set.runs.at(0).tracks) {
         for (const Sample& s : track.samples)
           EXPECT_TRUE(std::isfinite(s.time_s) && std::isfinite(s.x_mm) && std::isfinite(s.y_mm));

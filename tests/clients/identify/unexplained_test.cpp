@@ -85,6 +85,19 @@ TEST(Unexplained, NothingIsFoundInNoise) {
   }
 }
 
+TEST(Unexplained, TheSearchGoesOnWhereErrorsRepeat) {
+  // Noise to the model and to a learner, but the same in repetitions of the same commands.
+  const double noise_mm = 3, expected_mm = noise_mm * std::sqrt(2.0);
+  const Sets sets = windows_with([](const Window&) { return 0.0; }, noise_mm, 5);
+  const PredictionErrors errors = errors_by_track(sets.known, expected_mm);
+  const auto goes_on = [&](const std::optional<Replicates>& replicates) {
+    return leaves_systematic_error(sets.set, sets.known, errors, replicates, 2);
+  };
+  EXPECT_FALSE(goes_on({}));
+  EXPECT_FALSE(goes_on(Replicates{expected_mm, 0.3 * expected_mm, 40, 80}));
+  EXPECT_TRUE(goes_on(Replicates{0.5 * expected_mm, 0.87 * expected_mm, 40, 80}));
+}
+
 TEST(Unexplained, AWaveThatTravelsOverTheFloorIsFoundAndShown) {
   // Of place and time together; of neither alone.
   const auto wave = [](const Window& w) { return 5 * std::sin((w[Feature::kX] - 8 * w[Feature::kTime]) / 150); };

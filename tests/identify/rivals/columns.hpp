@@ -1,6 +1,7 @@
 /// Inputs of the rivals' regressions.
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <array>
 #include <vector>
@@ -60,6 +61,22 @@ inline void base_of(const Instant& at, int robots, Eigen::Ref<Eigen::VectorXd> t
   if (command == 3) return;
   to[command] = 1;
   to[3 + command * robots + at.robot] = 1;
+}
+
+/// Coefficients of these columns alone, by rate.
+[[nodiscard]] inline Eigen::MatrixXd base_coefficients(const std::vector<RateRow>& rows, int robots) {
+  const Eigen::Index columns = base_columns(robots);
+  const Eigen::MatrixXd base =
+      means(rows, columns, [&](const Instant& at, Eigen::VectorXd& to) { base_of(at, robots, to); });
+  Eigen::MatrixXd xx = base.transpose() * base;
+  constexpr double kRidge = 1;  // rows
+  xx.diagonal().array() += kRidge;
+  return xx.ldlt().solve(base.transpose() * rates_of(rows));
+}
+
+/// The speeds straight on, by robot, among coefficients that begin with those of the base columns.
+[[nodiscard]] inline Eigen::VectorXd straight_of(const Eigen::MatrixXd& coefficients, int robots) {
+  return (coefficients.col(0).segment(3, robots).array() + coefficients(0, 0)).matrix();
 }
 
 }  // namespace kilotwin::truth

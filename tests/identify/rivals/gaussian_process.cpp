@@ -82,6 +82,7 @@ Rival gaussian_process(const std::vector<RateRow>& rows, int robots) {
   }
   features->length = best.length;
   Rival rival;
+  rival.straight_mm_s = straight_of(best.coefficients, robots);
   rival.rates = [features, coefficients = best.coefficients](const Instant& at) -> Eigen::Vector3d {
     Eigen::VectorXd one(features->columns());
     features->of(at, one);

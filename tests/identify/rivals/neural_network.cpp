@@ -1,6 +1,5 @@
 // A small neural network of what the base model's rates leave: two hidden layers of 24 tanh units, trained by Adam with
 // weight decay and early stopping: D. Kingma, J. Ba, Adam (ICLR 2015).
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -74,9 +73,7 @@ Rival neural_network(const std::vector<RateRow>& rows, int robots) {
   const Eigen::MatrixXd base = means(rows, columns,
                                      [&](const Instant&at, Eigen::VectorXd&to) { base_of(at, robots, to); }),
                         y = rates_of(rows);
-  Eigen::MatrixXd xx = base.transpose() * base;
-  xx.diagonal().array() += 1;
-  const Eigen::MatrixXd by_base = xx.ldlt().solve(base.transpose() * y);
+  const Eigen::MatrixXd by_base = base_coefficients(rows, robots);
   Eigen::MatrixXd left = (y - base * by_base).transpose();
   const Eigen::Vector3d sd = (left.rowwise().squaredNorm() / static_cast<double>(left.cols())).cwiseSqrt();
   left = sd.cwiseInverse().asDiagonal() * left;
@@ -107,6 +104,7 @@ Rival neural_network(const std::vector<RateRow>& rows, int robots) {
     best = network;
   }
   Rival rival;
+  rival.straight_mm_s = straight_of(by_base, robots);
   rival.rates = [network = std::make_shared<Network>(best), by_base, sd, columns,
                  robots](const Instant& at) -> Eigen::Vector3d {
     if (at.motion == Motion::kStop) return Eigen::Vector3d::Zero();

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/stats/quantiles.hpp"
+#include "tests/identify/rivals/columns.hpp"
 
 namespace kilotwin::truth {
 namespace {
@@ -190,8 +191,8 @@ std::vector<RateRow> rate_rows(const std::vector<Run>& runs) {
   return rows;
 }
 
-std::vector<Prediction> predict(const Rival& rival, const std::vector<Run>& train, const Run& run,
-                                double horizon_s) {
+std::vector<Prediction> corrections(const Rival& rival, const Rival& base, const std::vector<Run>& train,
+                                    const Run& run, double horizon_s) {
   const Area area = walls_of(train);
   const auto tracks = tracks_of(run);
   std::vector<Prediction> out;
@@ -199,14 +200,31 @@ std::vector<Prediction> predict(const Rival& rival, const std::vector<Run>& trai
     const double from_s = time_s - horizon_s;
     const auto mark = static_cast<std::size_t>(std::lround(time_s / kMarkInterval_s));
     for (const auto& [robot, track] : tracks) {
-      const auto start = start_pose(rival, run, track, from_s, area);
+      const auto start = start_pose(base, run, track, from_s, area);
       if (!start) continue;
       const int near = near_to(tracks, robot, from_s, start->point);
-      const Pose end = taken(rival, run, robot, *start, from_s, time_s, near, area);
-      out.push_back({run.number, robot, time_s, end.point, run.marks[static_cast<std::size_t>(robot)][mark].point});
+      const Vec with = taken(rival, run, robot, *start, from_s, time_s, near, area).point,
+                without = taken(base, run, robot, *start, from_s, time_s, near, area).point;
+      out.push_back({run.number,
+                     robot,
+                     time_s,
+                     {with.x - without.x, with.y - without.y},
+                     run.marks[static_cast<std::size_t>(robot)][mark].point});
     }
   }
   return out;
+}
+
+Rival base_alone(const std::vector<RateRow>& rows, int robots) {
+  const Eigen::MatrixXd by_base = base_coefficients(rows, robots);
+  Rival rival;
+  rival.straight_mm_s = straight_of(by_base, robots);
+  rival.rates = [by_base, robots](const Instant& at) -> Eigen::Vector3d {
+    Eigen::VectorXd one(base_columns(robots));
+    base_of(at, robots, one);
+    return by_base.transpose() * one;
+  };
+  return rival;
 }
 
 }  // namespace kilotwin::truth

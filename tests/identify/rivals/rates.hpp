@@ -34,22 +34,26 @@ struct RateRow {
 /// All pairs of samples that are less than 1.5 s apart, of all tracks of some runs, except at walls and at other robots.
 [[nodiscard]] std::vector<RateRow> rate_rows(const std::vector<Run>& runs);
 
-/// A fitted rival.
+/// A fitted rival. Its rates are those of a base model, with speeds and turn rates of each robot under each command, plus what it has
+/// learned.
 struct Rival {
   std::function<Eigen::Vector3d(const Instant&)> rates;
+  Eigen::VectorXd straight_mm_s;  ///< by robot: the base model's part of the speed straight on
   /// Covariates that it names, as in result.json; empty for rivals that name none.
   Covariates covariates;
   bool names = false;
 };
 
 /// Fit a rival to training runs. Scenes without headings have no rates.
+[[nodiscard]] Rival base_alone(const std::vector<RateRow>&, int robots);
 [[nodiscard]] Rival sparse_regression(const std::vector<RateRow>&, int robots);
 [[nodiscard]] Rival gaussian_process(const std::vector<RateRow>&, int robots);
 [[nodiscard]] Rival neural_network(const std::vector<RateRow>&, int robots);
 
-/// The rows of predict() (oracle.hpp) by a rival. Start poses: a weighted mean of the last samples, each taken forward by
-/// the rival itself. Robots stay within the walls that `train` shows.
-[[nodiscard]] std::vector<Prediction> predict(const Rival&, const std::vector<Run>& train, const Run& run,
-                                              double horizon_s);
+/// The rows of predict() (oracle.hpp): where a rival ends less where `base` ends, by rates from the same start pose. Added to the
+/// predictions of a base model with a filter and contacts, it is what the rival has learned. Start poses: a weighted mean of the last
+/// samples, each taken forward by `base`. Robots stay within the walls that `train` shows. `predicted`: the difference, mm.
+[[nodiscard]] std::vector<Prediction> corrections(const Rival&, const Rival& base, const std::vector<Run>& train,
+                                                  const Run& run, double horizon_s);
 
 }  // namespace kilotwin::truth

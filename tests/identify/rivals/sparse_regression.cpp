@@ -191,6 +191,7 @@ Rival sparse_regression(const std::vector<RateRow>& rows, int robots) {
   if (std::abs(c(1, 2) + c(2, 2)) > kUnlike * std::abs(c(1, 2))) found.insert("command");
   Rival rival;
   rival.names = true;
+  rival.straight_mm_s = straight_of(c, robots);
   rival.covariates.assign(found.begin(), found.end());
   rival.rates = [coefficients, columns, robots](const Instant& at) -> Eigen::Vector3d {
     Eigen::VectorXd one(columns);

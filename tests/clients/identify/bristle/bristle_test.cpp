@@ -85,15 +85,20 @@ identify::Options second() {
   return options;
 }
 
+identify::Identified all_stages(std::vector<BristleRun> train, std::vector<BristleRun> test,
+                                const identify::Options& options) {
+  return identify::identified_by(*bristle_study(std::move(train), std::move(test), options), options);
+}
+
 TEST(Bristle, NoEffectInDataWithoutEffects) {
   int alarms = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed)
-    alarms += found(identify_bristle(runs_of({}, 1000 * seed, 12), {}, second())).empty() ? 0 : 1;
+    alarms += found(all_stages(runs_of({}, 1000 * seed, 12), {}, second())).empty() ? 0 : 1;
   EXPECT_LE(alarms, 1);
 }
 
 TEST(Bristle, ClockwiseHeadingsAreDetected) {
-  const auto identified = identify_bristle(runs_of({.mirrored = true}, 50, 12), {}, second());
+  const auto identified = all_stages(runs_of({.mirrored = true}, 50, 12), {}, second());
   EXPECT_TRUE(found(identified).contains("heading-sense"));
   EXPECT_LT(after_mm(identified), 0.25 * before_mm(identified));
   ASSERT_GE(identified.model.effect_size(), 1);
@@ -101,14 +106,14 @@ TEST(Bristle, ClockwiseHeadingsAreDetected) {
 }
 
 TEST(Bristle, ConfusedFrontAndBackIsDetectedToo) {
-  const auto names = found(identify_bristle(runs_of({.mirrored = true, .flips = true}, 70, 12), {}, second()));
+  const auto names = found(all_stages(runs_of({.mirrored = true, .flips = true}, 70, 12), {}, second()));
   EXPECT_TRUE(names.contains("heading-sense"));
   EXPECT_TRUE(names.contains("front-for-back"));
 }
 
 TEST(Bristle, AnInclineCausesADownhillDrift) {
   const auto identified =
-      identify_bristle(runs_of({.mirrored = true, .drift_x = -32, .drift_y = 8}, 90, 12), {}, second());
+      all_stages(runs_of({.mirrored = true, .drift_x = -32, .drift_y = 8}, 90, 12), {}, second());
   EXPECT_TRUE(found(identified).contains("downhill"));
   for (const identification::Effect& effect : identified.found.result().effects()) {
     if (effect.name() != "downhill") continue;
@@ -121,7 +126,7 @@ TEST(Bristle, AnInclineCausesADownhillDrift) {
 }
 
 TEST(Bristle, TheSizeOfTheDriftDoesNotDependOnTheTrackersHeadings) {
-  const auto identified = identify_bristle(
+  const auto identified = all_stages(
       runs_of({.mirrored = true, .flips = true, .drift_x = 24, .drift_y = 24, .mount_rad = 0.4, .turn_rad_s = 0.15},
               110, 12),
       {}, second());
@@ -165,7 +170,7 @@ TEST(Bristle, TheMeasuredRunsShowTrackerEffects) {
   if (!std::filesystem::exists(data))
     GTEST_SKIP() << "there is no " << data << ": the measured runs are not part of the project";
   ASSERT_TRUE(has_bristle_runs(data));
-  const auto identified = identify_bristle(read_bristle_runs(data), {}, second());
+  const auto identified = all_stages(read_bristle_runs(data), {}, second());
   const auto names = found(identified);
   EXPECT_TRUE(names.contains("heading-sense"));
   EXPECT_TRUE(names.contains("front-for-back"));

@@ -177,7 +177,8 @@ TEST(IdentifyFloor, SaysWhichDaysChoseAndThatDaysWereOpenedBefore) {
   identify::Options options;
   options.find_effects = false;
   static_cast<void>(OpenedDays(scratch.path).open(played(4, 5), Days(days(0, 2)), "", "2026-01-01"));
-  const identify::Identified found = identify_floor(played(1, 4), played(4, 5), options, scratch.path);
+  const identify::Identified found =
+      identify::identified_by(*floor_study(played(1, 4), played(4, 5), options, scratch.path), options);
   const identification::Result& result = found.found.result();
   EXPECT_EQ(result.held_out().in_words(), "Days that give the errors: day-4. Days that chose the model: day-3.");
   EXPECT_EQ(result.held_out().opened_before(), 1U);

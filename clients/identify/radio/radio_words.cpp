@@ -1,23 +1,19 @@
-#include "clients/cli/identify/radio_data.hpp"
+#include "clients/identify/radio/radio_words.hpp"
 
 #include <fmt/format.h>
 
 #include <array>
 #include <cmath>
 #include <map>
+#include <utility>
 
-#include "clients/identify/radio/radio_fit.hpp"
 #include "clients/identify/result/values.hpp"
 
-namespace kilotwin::cli {
-namespace fs = std::filesystem;
+namespace kilotwin::radio_fit {
 namespace {
 
 using identification::RadioErrors, identification::RadioStep;
 using identify::json_list, identify::json_value;
-
-/// Simulated runs per effect and set, and sampled swarms: some minutes of one core in total.
-constexpr int kRuns = 24, kSwarms = 80;
 
 /// Mean over the sets of one error of a step, in absolute value.
 double mean_of(const RadioStep& step, double (RadioErrors::*error)() const) {
@@ -156,37 +152,17 @@ void add_words(identification::Identification& found) {
 
 }  // namespace
 
-bool has_radio_runs(const fs::path& directory) {
-  std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(directory, error)) {
-    const std::string name = entry.path().filename().string();
-    if (name.starts_with("comm_tau") && name.find("_run") != std::string::npos && name.ends_with(".dat"))
-      return true;
-  }
-  return false;
+identify::Identified identified_of(const identification::RadioFit& fit, proto::Model model) {
+  identify::Identified out;
+  out.model = std::move(model);
+  *out.found.mutable_result() = result_of(fit);
+  add_words(out.found);
+  *out.found.add_tables() = table_of_errors(fit);
+  *out.found.add_tables() = table_of_numbers(fit);
+  *out.found.add_tables() = table_of_population(fit);
+  out.found.mutable_set()->set_has_headings(false);
+  out.found.mutable_set()->set_has_commands(false);
+  return out;
 }
 
-identify::Identified identify_radio_runs(const fs::path& train, const fs::path& test, const fs::path& out,
-                                         const identify::Options& options) {
-  radio_fit::FitOptions fit;
-  fit.train = train;
-  fit.test = test;
-  fit.out = out / "radio";
-  fit.runs = kRuns;
-  fit.swarms = kSwarms;
-  fit.progress = options.progress ? options.progress : [](const stats::Work&) {};
-  const radio_fit::RadioFound fitted = radio_fit::fit_radio(fit);
-
-  identify::Identified result;
-  result.model = fitted.model;
-  *result.found.mutable_result() = result_of(fitted.fit);
-  add_words(result.found);
-  *result.found.add_tables() = table_of_errors(fitted.fit);
-  *result.found.add_tables() = table_of_numbers(fitted.fit);
-  *result.found.add_tables() = table_of_population(fitted.fit);
-  result.found.mutable_set()->set_has_headings(false);
-  result.found.mutable_set()->set_has_commands(false);
-  return result;
-}
-
-}  // namespace kilotwin::cli
+}  // namespace kilotwin::radio_fit

@@ -1,4 +1,4 @@
-#include "clients/identify/radio/radio_fit.hpp"
+#include "clients/identify/radio/radio_study.hpp"
 
 #include <fmt/format.h>
 #include <google/protobuf/text_format.h>
@@ -6,12 +6,15 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "clients/identify/radio/evidence.hpp"
 #include "clients/identify/radio/grid_run.hpp"
 #include "clients/identify/radio/link_fit.hpp"
 #include "clients/identify/radio/link_intervals.hpp"
+#include "clients/identify/radio/radio_words.hpp"
 #include "clients/identify/radio/scores.hpp"
 #include "clients/identify/result/result_json.hpp"
 #include "clients/identify/result/values.hpp"
@@ -43,30 +46,36 @@ struct Step {
   std::vector<Errors> errors;  ///< per set
 };
 
-class Loop {
+class RadioStudy final : public identify::Study {
  public:
-  explicit Loop(const FitOptions& options) : options_(options) {
-    const std::vector<GridSet> all = read_grids(options.train);
-    train_ = options.test.empty() ? half_of(all, options.swap) : all;
-    test_ = options.test.empty() ? half_of(all, !options.swap) : read_grids(options.test);
+  RadioStudy(const RadioData& data, const RadioWork& work, std::filesystem::path out, identify::Options options)
+      : work_(work), out_(std::move(out)), options_(std::move(options)) {
+    const std::vector<GridSet> all = read_grids(data.train);
+    train_ = data.test.empty() ? half_of(all, data.swap) : all;
+    test_ = data.test.empty() ? half_of(all, !data.swap) : read_grids(data.test);
     if (train_.size() != test_.size())
       throw UserError(fmt::format("{}: other sets than in {}; give runs of the same tau in both",
-                                  options.test.string(), options.train.string()));
+                                  data.test.string(), data.train.string()));
     for (const auto& sets : {train_, test_}) {
       for (const GridSet& set : sets) {
         if (set.runs.empty() || set.robots() != train_.front().robots())
           throw UserError(
               fmt::format("{}: {} has no run to spare, or another number of robots; give two runs of each "
                           "set at least",
-                          options.train.string(), set.name));
+                          data.train.string(), set.name));
       }
     }
   }
-  [[nodiscard]] RadioFound go();
+  /// The ARGoS model, and what its disc needs.
+  void fit() override;
+  /// The links' terms, then the packets and the clocks.
+  void search() override;
+  /// Each effect is judged when it is added; here the population.
+  void judge() override { draw_population(); }
+  identify::Identified report() override;
 
  private:
   void add(Step step, const Radios& radios);
-  void add_simple();
   void add_links();
   void add_packets();
   void add_oscillators();
@@ -89,7 +98,9 @@ class Loop {
   [[nodiscard]] Radios alike(const proto::Radio& radio) const { return Radios(train_.size(), radio); }
   [[nodiscard]] Radios fitted(const LinkModel& model) const;
 
-  const FitOptions options_;
+  const RadioWork work_;
+  const std::filesystem::path out_;
+  const identify::Options options_;
   std::vector<GridSet> train_, test_;
   std::vector<Step> steps_;
   LinkModel model_;
@@ -111,9 +122,9 @@ identification::Evidence entry_of(const Evidence& e) {
   return out;
 }
 
-void Loop::add(Step step, const Radios& radios) {
+void RadioStudy::add(Step step, const Radios& radios) {
   for (std::size_t q = 0; q < train_.size(); ++q) {
-    const GridSet simulated = simulate(train_[q], radios[q], options_.runs, kFirstSeed);
+    const GridSet simulated = simulate(train_[q], radios[q], work_.runs, kFirstSeed);
     step.errors.push_back(compare(test_[q], simulated, train_[q]));
   }
   const std::string shown = fmt::format("{}: {}", step.name, step.evidence);
@@ -127,7 +138,7 @@ void Loop::add(Step step, const Radios& radios) {
   steps_.push_back(std::move(step));
 }
 
-Radios Loop::fitted(const LinkModel& model) const {
+Radios RadioStudy::fitted(const LinkModel& model) const {
   Radios radios;
   for (const LinkModel::Swarm& swarm : model.swarms) radios.push_back(model.radio(swarm, timing_));
   return radios;
@@ -141,11 +152,11 @@ double near_error(const std::vector<GridSet>& sets, const proto::Radio& radio) {
   return sum;
 }
 
-void Loop::add_simple() {
-  const LinkModel distance = fit_links(train_, Terms::kDistance);
+void RadioStudy::fit() {
+  model_ = fit_links(train_, Terms::kDistance);
   proto::Radio radio;
   radio.set_model(proto::Radio::SIMPLE);
-  radio.set_range_mm(distance.range_mm);
+  radio.set_range_mm(model_.range_mm);
   const auto tune = [&] {
     double best = 1e9, contention = 1;
     for (const double tried : {0.0, 0.05, 0.1, 0.2, 0.4, 1.0}) {
@@ -162,7 +173,7 @@ void Loop::add_simple() {
   add({"ARGoS model",
        fmt::format("2 Hz, sending error 0.008, range {:.0f} mm, contention {:.2f}: tuned to the mean "
                    "reception",
-                   distance.range_mm, radio.simple().contention()),
+                   model_.range_mm, radio.simple().contention()),
        {},
        "-",
        {},
@@ -183,7 +194,7 @@ void Loop::add_simple() {
       alike(radio));
   proto::Radio disc;
   disc.set_model(proto::Radio::DISC);
-  disc.set_range_mm(distance.range_mm);
+  disc.set_range_mm(model_.range_mm);
   const Evidence hidden = hidden_terminal_evidence(train_);
   add({"packet timing",
        "packets of 4.371 ms, carrier sense from the start pulse, collisions where two overlap; nothing is tuned",
@@ -194,7 +205,7 @@ void Loop::add_simple() {
       alike(disc));
 }
 
-void Loop::add_links() {
+void RadioStudy::add_links() {
   const auto heard_in_some_run = [&] {
     double partly = 0, far = 0;
     for (const GridSet& set : train_) {
@@ -210,7 +221,6 @@ void Loop::add_links() {
     }
     return partly / far;
   };
-  model_ = fit_links(train_, Terms::kDistance);
   identification::Evidence heard;
   heard.set_heard_in_some_run(heard_in_some_run());
   add({"signal strength",
@@ -256,13 +266,13 @@ void Loop::add_links() {
 }
 
 /// Loss of single packets: from the number of links with partial reception.
-void Loop::add_packets() {
+void RadioStudy::add_packets() {
   const auto partial = [&](double sd_db) {
     timing_.packet_sd_db = sd_db;
     const Radios radios = fitted(model_);
     double sum = 0;
     for (std::size_t q = 0; q < train_.size(); ++q)
-      sum += statistics(simulate(train_[q], radios[q], options_.runs / 2, kFirstSeed)).partial;
+      sum += statistics(simulate(train_[q], radios[q], work_.runs / 2, kFirstSeed)).partial;
     return sum / static_cast<double>(train_.size());
   };
   double measured = 0;
@@ -292,7 +302,7 @@ void Loop::add_packets() {
 
 /// A robot with a fast clock meets ongoing transmissions more often and waits: its number of messages determines
 /// its rate.
-void Loop::fit_oscillators(int rounds) {
+void RadioStudy::fit_oscillators(int rounds) {
   // One message in 300 corresponds to 1/300 of the rate under saturation, less otherwise. Steps below 1 converge.
   constexpr double kStep = 0.7 / 300;
   Eigen::VectorXd& rate = timing_.oscillator;
@@ -303,8 +313,7 @@ void Loop::fit_oscillators(int rounds) {
     for (std::size_t q = 0; q < train_.size(); ++q) {
       const auto weight = static_cast<double>(train_[q].runs.size());
       const std::uint64_t seed = kFirstSeed + 100 * static_cast<std::uint64_t>(round + 1);
-      excess +=
-          weight * (mean_sent(simulate(train_[q], radios[q], options_.runs / 2, seed)) - mean_sent(train_[q]));
+      excess += weight * (mean_sent(simulate(train_[q], radios[q], work_.runs / 2, seed)) - mean_sent(train_[q]));
       runs += weight;
     }
     rate += kStep / runs * excess;
@@ -313,14 +322,14 @@ void Loop::fit_oscillators(int rounds) {
 }
 
 /// Clock rates vary between runs: the maximum-likelihood spread.
-void Loop::fit_wander() {
+void RadioStudy::fit_wander() {
   double best = -1e9, chosen = 0;
   for (const double sd : {0.0, 0.0005, 0.001, 0.002, 0.003, 0.004, 0.005}) {
     timing_.oscillator_sd = sd;
     const Radios radios = fitted(model_);
     double likelihood = 0;
     for (std::size_t q = 0; q < train_.size(); ++q)
-      likelihood += log_likelihood(train_[q], simulate(train_[q], radios[q], options_.runs, kFirstSeed + 1000));
+      likelihood += log_likelihood(train_[q], simulate(train_[q], radios[q], work_.runs, kFirstSeed + 1000));
     if (likelihood <= best) continue;
     best = likelihood;
     chosen = sd;
@@ -328,7 +337,7 @@ void Loop::fit_wander() {
   timing_.oscillator_sd = chosen;
 }
 
-void Loop::add_oscillators() {
+void RadioStudy::add_oscillators() {
   const Evidence own = oscillator_evidence(train_);
   timing_.oscillator = Eigen::VectorXd::Zero(train_.front().robots());
   timing_.oscillator_sd = 0.001;
@@ -348,7 +357,7 @@ void Loop::add_oscillators() {
 }
 
 /// Carrier sense at levels below reception: robots wait for senders that they cannot receive.
-void Loop::add_carrier_sense() {
+void RadioStudy::add_carrier_sense() {
   const Evidence notice = hidden_sender_evidence(train_);
   double best = 1e9, chosen = 0;
   for (const double notice_db : {0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0}) {
@@ -357,7 +366,7 @@ void Loop::add_carrier_sense() {
     double error = 0;
     for (std::size_t q = 0; q < train_.size(); ++q) {
       const double lost = 1 - statistics(train_[q]).near;
-      const double simulated = 1 - statistics(simulate(train_[q], radios[q], options_.runs, kFirstSeed)).near;
+      const double simulated = 1 - statistics(simulate(train_[q], radios[q], work_.runs, kFirstSeed)).near;
       error += (simulated - lost) * (simulated - lost);
     }
     if (error >= best) continue;
@@ -376,7 +385,7 @@ void Loop::add_carrier_sense() {
 }
 
 /// With random clocks: own rates and variation between runs.
-LinkModel::Timing Loop::drawn() const {
+LinkModel::Timing RadioStudy::drawn() const {
   LinkModel::Timing timing = timing_;
   const double own = timing.oscillator.squaredNorm() / static_cast<double>(timing.oscillator.size());
   timing.oscillator_sd = std::sqrt(own + timing.oscillator_sd * timing.oscillator_sd);
@@ -385,9 +394,9 @@ LinkModel::Timing Loop::drawn() const {
 }
 
 template <class RadioOf>
-std::vector<std::vector<double>> Loop::reception_of_swarms(std::size_t q, RadioOf&& radio_of) const {
+std::vector<std::vector<double>> RadioStudy::reception_of_swarms(std::size_t q, RadioOf&& radio_of) const {
   std::vector<std::vector<double>> drawn(statistics(test_[q]).classes.size());
-  for (int k = 0; k < options_.swarms; ++k) {
+  for (int k = 0; k < work_.swarms; ++k) {
     GridSet one = train_[q];
     one.runs = {simulate(train_[q], radio_of(k), kFirstSwarm + static_cast<std::uint64_t>(k))};
     const Statistics s = statistics(one);
@@ -397,7 +406,7 @@ std::vector<std::vector<double>> Loop::reception_of_swarms(std::size_t q, RadioO
 }
 
 /// Predictive check with new robots: is the measured set typical of the population?
-void Loop::draw_population() {
+void RadioStudy::draw_population() {
   for (std::size_t q = 0; q < train_.size(); ++q) {
     const proto::Radio radio = model_.population(model_.swarms[q], drawn());
     const Statistics real = statistics(test_[q]);
@@ -420,7 +429,7 @@ void Loop::draw_population() {
   }
 }
 
-const LinkModel::Swarm& Loop::steadiest() const {
+const LinkModel::Swarm& RadioStudy::steadiest() const {
   // Undisturbed placements vary least between runs.
   return *std::min_element(model_.swarms.begin(), model_.swarms.end(),
                            [](const auto& a, const auto& b) { return a.run_sd_db < b.run_sd_db; });
@@ -432,7 +441,7 @@ void write_text(const std::filesystem::path& file, const std::string& text) {
   if (!out.flush()) throw RunError(file.string() + ": cannot be written");
 }
 
-proto::Model Loop::write_models() const {
+proto::Model RadioStudy::write_models() const {
   const auto write = [&](const proto::Radio& radio, const std::string& name, const std::string& about) {
     proto::Model model;
     proto::Propagation& propagation = *model.mutable_propagation() = radio.propagation();
@@ -440,7 +449,7 @@ proto::Model Loop::write_models() const {
     propagation.set_oscillator_sd(radio.oscillator_sd());
     std::string text;
     google::protobuf::TextFormat::PrintToString(model, &text);
-    write_text(options_.out / name, "# " + about + "\n" + text);
+    write_text(out_ / name, "# " + about + "\n" + text);
     return model;
   };
   for (std::size_t q = 0; q < train_.size(); ++q) {
@@ -484,7 +493,7 @@ identification::RadioModel entry_of(const LinkModel& model, const LinkModel::Tim
   return out;
 }
 
-identification::RadioFit Loop::result() const {
+identification::RadioFit RadioStudy::result() const {
   identification::RadioFit out;
   for (const Step& step : steps_) {
     identification::RadioStep& effect = *out.add_effects();
@@ -517,7 +526,7 @@ std::string cells_of(const identification::RadioErrors& e) {
                      e.run_spread_error(), e.log_likelihood(), e.deficit());
 }
 
-void Loop::write_tables(const identification::RadioFit& fit) const {
+void RadioStudy::write_tables(const identification::RadioFit& fit) const {
   std::string table =
       "| effect | evidence | added | set | sent | near | far | silent | senders | runs | likelihood | deficit "
       "|\n"
@@ -546,12 +555,12 @@ void Loop::write_tables(const identification::RadioFit& fit) const {
                          row.columns(), row.distance_mm(), row.measured(), fitted, row.low(), row.high(),
                          row.inside() ? "" : ", outside");
   }
-  write_text(options_.out / "effects.md", table);
+  write_text(out_ / "effects.md", table);
 }
 
 /// The measured sets beside swarms that stand as those of model.txtpb do, and beside swarms of other placements: the common pattern
 /// plus one that is drawn for each swarm. Classes of one distance together.
-void Loop::write_placements() const {
+void RadioStudy::write_placements() const {
   const proto::Radio population = model_.population(steadiest(), drawn());
   const auto with_pattern = [&](const std::vector<double>& pattern_db) {
     LinkModel::Swarm swarm = steadiest();
@@ -600,14 +609,14 @@ void Loop::write_placements() const {
       table += "\n";
     }
   }
-  write_text(options_.out / "placements.md", table);
+  write_text(out_ / "placements.md", table);
 }
 
-void Loop::write_figures() const {
+void RadioStudy::write_figures() const {
   for (std::size_t q = 0; q < train_.size(); ++q) {
     Plot plot;
     plot.title = fmt::format("Reception over distance, {}", train_[q].name);
-    plot.subtitle = fmt::format("{} held-out runs; {} simulated runs", test_[q].runs.size(), options_.runs);
+    plot.subtitle = fmt::format("{} held-out runs; {} simulated runs", test_[q].runs.size(), work_.runs);
     plot.x_name = "distance";
     plot.x_unit = "mm";
     plot.y_name = "reception share";
@@ -624,7 +633,7 @@ void Loop::write_figures() const {
     series("measured", statistics(test_[q]));
     series(steps_.front().name, steps_.front().errors[q].simulated);
     series("all effects", steps_.back().errors[q].simulated);
-    write_plot(plot, options_.out / ("reception-" + train_[q].name + ".svg"));
+    write_plot(plot, out_ / ("reception-" + train_[q].name + ".svg"));
   }
   Plot plot;
   plot.title = "Gain of each effect";
@@ -642,29 +651,43 @@ void Loop::write_figures() const {
       line.y.push_back(std::max(steps_[n].errors[q].deficit, 1e-3));
     }
   }
-  write_plot(plot, options_.out / "effects.svg");
+  write_plot(plot, out_ / "effects.svg");
 }
 
-RadioFound Loop::go() {
-  std::error_code error;
-  std::filesystem::create_directories(options_.out, error);
-  if (error) throw UserError(fmt::format("{}: cannot be made: {}", options_.out.string(), error.message()));
-  add_simple();
+void RadioStudy::search() {
   add_links();
   add_packets();
   add_oscillators();
   add_carrier_sense();
-  draw_population();
-  RadioFound found{result(), write_models()};
-  write_text(options_.out / "result.json", identify::json_of(found.fit).dump(2) + "\n");
-  write_tables(found.fit);
-  if (options_.placements) write_placements();
+}
+
+identify::Identified RadioStudy::report() {
+  std::error_code error;
+  std::filesystem::create_directories(out_, error);
+  if (error) throw UserError(fmt::format("{}: cannot be made: {}", out_.string(), error.message()));
+  const identification::RadioFit fit = result();
+  proto::Model model = write_models();
+  write_text(out_ / "result.json", identify::json_of(fit).dump(2) + "\n");
+  write_tables(fit);
+  if (work_.placements) write_placements();
   write_figures();
-  return found;
+  return identified_of(fit, std::move(model));
 }
 
 }  // namespace
 
-RadioFound fit_radio(const FitOptions& options) { return Loop(options).go(); }
+bool has_radio_runs(const std::filesystem::path& directory) {
+  std::error_code error;
+  const std::filesystem::directory_iterator files(directory, error);
+  return std::any_of(begin(files), end(files), [](const std::filesystem::directory_entry& entry) {
+    const std::string name = entry.path().filename().string();
+    return name.starts_with("comm_tau") && name.find("_run") != std::string::npos && name.ends_with(".dat");
+  });
+}
+
+std::unique_ptr<identify::Study> radio_study(const RadioData& data, const RadioWork& work,
+                                             std::filesystem::path out, const identify::Options& options) {
+  return std::make_unique<RadioStudy>(data, work, std::move(out), options);
+}
 
 }  // namespace kilotwin::radio_fit
