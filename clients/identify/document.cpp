@@ -14,6 +14,7 @@
 #include "clients/identify/model/effect_text.hpp"
 #include "clients/identify/predict/final_check.hpp"
 #include "clients/identify/residual_plots.hpp"
+#include "clients/identify/result/covariate_words.hpp"
 #include "clients/identify/result/values.hpp"
 
 namespace kilotwin::identify {
@@ -104,16 +105,6 @@ std::string next_step(const Findings& f) {
   return fmt::format("Use the model: kilotwin run EXPERIMENT --model {}", f.model_file);
 }
 
-/// A covariate of result.json, as words.
-std::string in_words(const std::string& covariate) {
-  static const std::map<std::string, std::string> kWords = {{"motor_time", "motor-on time"},
-                                                            {"time_since_command", "time since the command"},
-                                                            {"world_frame", "the directions of the arena"},
-                                                            {"measurement", "the camera"}};
-  const auto at = kWords.find(covariate);
-  return at == kWords.end() ? covariate : at->second;
-}
-
 /// Share of the reduction of the mean square error that is lost without a term.
 double share_removed(const Findings& f, double without_mm) {
   const double before_mm = f.before.errors.rmse_mm(), after_mm = f.after.errors.rmse_mm(),
@@ -144,7 +135,7 @@ identification::Effect effect_of(const Findings& f, std::size_t t) {
   const std::vector<proto::Effect> written = effects_of_term(term);
   std::vector<std::string> records, covariates;
   for (const proto::Effect& effect : written) records.push_back(effect.ShortDebugString());
-  for (const std::string& covariate : reason.covariates) covariates.push_back(in_words(covariate));
+  for (const std::string& covariate : reason.covariates) covariates.push_back(covariate_in_words(covariate));
   identification::Effect out;
   out.set_name(term.name);
   assign(out.mutable_covariates(), reason.covariates);

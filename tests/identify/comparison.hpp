@@ -20,8 +20,8 @@ class Comparison {
   void add(const Scene&, const Play&, const std::vector<Prediction>& oracle, const Verdict& identified,
            const std::filesystem::path& out);
   void print_header() const;
-  /// Over all rows: error over the oracle's and reduction of the base model's error (geometric means), precision, recall
-  /// and F1 of the causes, sets with a false cause, error of the robots' speeds in sets without an effect, mean seconds.
+  /// Over all rows: error over the oracle's and reduction of the base model's error (geometric means), mean seconds. Of the causes
+  /// precision, recall, F1, and the sets with a false one. In sets without an effect: error of the robots' speeds.
   void print_summary() const;
 
  private:

@@ -1,5 +1,5 @@
-/// The study of radio counts: the radio model is fitted to measured grids, from the ARGoS model to the full one, effect by effect, with
-/// the evidence in the residuals and the errors on held-out runs.
+/// The study of radio counts: a fit of the radio model to measured grids. It goes from the ARGoS model to the full one, effect by
+/// effect. Each has its evidence in the residuals, and its errors on held-out runs.
 #pragma once
 
 #include <filesystem>

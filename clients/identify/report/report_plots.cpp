@@ -8,6 +8,7 @@
 #include <map>
 #include <vector>
 
+#include "clients/identify/result/covariate_words.hpp"
 #include "core/stats/quantiles.hpp"
 
 namespace kilotwin::identify {
@@ -217,23 +218,9 @@ std::string words_of(const std::string& name) {
                                                             {"measured_x", "measured position along x"},
                                                             {"measured_y", "measured position along y"},
                                                             {"measured", "measured position"},
-                                                            {"world", "drift"},
-                                                            {"time", "time in the run"},
-                                                            {"position", "place"},
-                                                            {"command", "command"},
-                                                            {"time_since_command", "time since the command"},
-                                                            {"motor_time", "motor-on time"},
-                                                            {"neighbours", "neighbours"},
-                                                            {"world_frame", "world frame"},
-                                                            {"measurement", "measurement"},
-                                                            {"robot", "robot"},
-                                                            {"history", "history"},
-                                                            {"heading", "heading"}};
+                                                            {"world", "drift"}};
   const auto at = kWords.find(name);
-  if (at != kWords.end()) return at->second;
-  std::string plain = name;
-  std::replace(plain.begin(), plain.end(), '_', ' ');
-  return plain;
+  return at != kWords.end() ? at->second : covariate_in_words(name);
 }
 
 PlotNumber plot_horizon(Gnuplot& plots, const identification::Horizon& horizon) {

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "clients/identify/report/report_plots.hpp"
+#include "clients/identify/result/covariate_words.hpp"
 
 namespace kilotwin::identify::report {
 namespace {
@@ -30,23 +31,6 @@ const std::map<std::string, TargetText>& targets() {
                                                              {"MEASURED_HEADING", {"measured heading", true}},
                                                              {"NOISE", {"size of the motion noise"}}};
   return kTargets;
-}
-
-/// A covariate as the object of "depends on ...".
-std::string phrase_of(const std::string& covariate) {
-  static const std::map<std::string, std::string> kPhrases = {{"time", "time in the run"},
-                                                              {"position", "position"},
-                                                              {"heading", "heading"},
-                                                              {"command", "command"},
-                                                              {"time_since_command", "time since the command"},
-                                                              {"motor_time", "motor-on time"},
-                                                              {"neighbours", "neighbours"},
-                                                              {"world_frame", "world frame"},
-                                                              {"measurement", "camera or tracker"},
-                                                              {"robot", "robot"},
-                                                              {"history", "history"}};
-  const auto at = kPhrases.find(covariate);
-  return at == kPhrases.end() ? words_of(covariate) : at->second;
 }
 
 /// A whole number in superscript digits.
@@ -95,7 +79,8 @@ std::optional<double> log10_of(std::optional<double> p) {
 
 std::string covariates_of(const Texts& covariates) {
   std::string out;
-  for (const std::string& covariate : covariates) out += (out.empty() ? "" : " and ") + phrase_of(covariate);
+  for (const std::string& covariate : covariates)
+    out += (out.empty() ? "" : " and ") + covariate_in_words(covariate);
   return out.empty() ? "no covariate (constant)" : out;
 }
 

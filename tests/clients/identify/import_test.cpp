@@ -115,7 +115,7 @@ TEST_F(ImportTest, TablesOfTheCameraTrackerInMillimetres) {
   const MeasuredSet set = imported();
   ASSERT_EQ(set.tracks(), 2U);
   EXPECT_FALSE(set.has_headings) << "they follow from the positions";
-  EXPECT_EQ(set.runs[0].tracks[1].robot, 4U);
+  EXPECT_EQ(set.runs[0].tracks[1].robot, 1U) << "tracks without a robot's number are numbered anew";
   EXPECT_DOUBLE_EQ(set.runs[0].tracks[0].samples[1].x_mm, 15);
   EXPECT_DOUBLE_EQ(set.runs[0].tracks[0].samples[1].y_mm, 150) << "y upwards";
   EXPECT_DOUBLE_EQ(set.runs[0].tracks[1].samples[0].y_mm, -150);

@@ -91,7 +91,7 @@ TEST(Report, ShowsTheDocument) {
   const std::string page = page_of(full_document());
   EXPECT_TRUE(parses(page));
   for (const char* said :
-       {"time in the run", "the measurement", "16.3 mm", "3.52 mm", "3.38 mm", "Wheels run slower the later it is.",
+       {"depends on time", "the measurement", "16.3 mm", "3.52 mm", "3.38 mm", "Wheels run slower the later it is.",
         "10⁻²⁰⁰", "Robots 3 and 9 carry each other", "Let some rest.", "grain", "id=\"maps\"", "id=\"simulated\"",
         "wheel base, mm", "83 %"}) {
     EXPECT_NE(page.find(said), std::string::npos) << said;
