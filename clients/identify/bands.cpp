@@ -61,6 +61,7 @@ class TermBand {
   }
 
  private:
+  /// Shift to either side of a step, in the unit of its covariate: far below any interval, above rounding.
   static constexpr double kBeyond = 1e-6;
 
   [[nodiscard]] BandPoint interval(const std::vector<BlockPlace>& places) const {
@@ -105,6 +106,8 @@ struct BandAxis {
 /// The range of a curve. Those of exponentials and steps follow from their points.
 std::pair<double, double> range_of(const Factor& factor) {
   const auto largest = [&] { return *std::max_element(factor.points.begin(), factor.points.end()); };
+  // Ranges relative to the largest point: after three lengths 5 % of an exponential are left, and a quarter more shows what
+  // follows the last step.
   constexpr double kDecayed = 3, kBeyond = 1.25;
   switch (factor.shape) {
     case Shape::kHarmonics:
@@ -145,8 +148,9 @@ std::vector<BandAxis> axes_of(const Basis& basis, std::size_t count) {
 
 /// The covariates with as many values as the number of covariates allows.
 std::vector<BandAxis> axes_of(const Basis& basis) {
+  // Values of each covariate: the entry for their number, or a later one that keeps to kMostPlaces.
   constexpr std::array<std::size_t, 5> kCounts = {21, 9, 5, 3, 2};
-  constexpr double kMostPlaces = 1200;
+  constexpr double kMostPlaces = 1200;  // places of a band; more show it finer, and make the result longer
   const std::size_t axes = axes_of(basis, 2).size();
   std::vector<BandAxis> best;
   for (std::size_t c = std::min(axes > 0 ? axes - 1 : 0, kCounts.size() - 1); c < kCounts.size(); ++c) {

@@ -163,6 +163,7 @@ using Effects = google::protobuf::RepeatedPtrField<identification::Effect>;
 void keep_shares_that_add_up(Effects& effects) {
   double sum = 0;
   for (const identification::Effect& effect : effects) sum += effect.share_removed().number_value();
+  // Largest difference of the sum from 1; a larger value keeps shares that count effects twice.
   constexpr double kOff = 0.1;
   if (effects.size() < 2 || std::abs(sum - 1) < kOff) return;
   for (identification::Effect& effect : effects) *effect.mutable_share_removed() = json_null();
@@ -297,6 +298,8 @@ identification::Numbering entry_of(const Numbering& numbering) {
 
 /// Where contacts and walls act, and what the data say about it.
 identification::DiscCentre disc_centre_of(const MotionModel& model, const GeometryIntervals& intervals) {
+  // Distance below which the disc centre counts as the tracked point, and nat from which on contacts count as its evidence.
+  // They decide words, no fit.
   constexpr double kSame_mm = 3, kTold = 3;
   const bool tracked = std::abs(model.base.centre_mm - model.base.ahead_mm) < kSame_mm;
   const std::string where =

@@ -114,7 +114,7 @@ std::vector<Prediction> predictions_of(const Findings& f, const MeasuredSet& jud
 
 /// The written model with an ambiguous effect exchanged for its alternative, refitted. The closest alternatives first.
 std::vector<std::pair<std::string, proto::Model>> candidates_of(const Findings& f, const Fitter& fitter) {
-  constexpr std::size_t kMost = 3;
+  constexpr std::size_t kMost = 3;  // alternatives, the closest; each costs a fit
   std::vector<Ambiguity> closest = f.found.ambiguous;
   std::stable_sort(closest.begin(), closest.end(), [](const Ambiguity& a, const Ambiguity& b) {
     return a.evidence_difference < b.evidence_difference;

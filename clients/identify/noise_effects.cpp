@@ -68,7 +68,8 @@ class VarianceFit {
   /// The posterior mode of the coefficients from the samples that `use` picks.
   template <class Use> [[nodiscard]] Eigen::VectorXd coefficients(const Eigen::MatrixXd& columns, Use&& use) const {
     Eigen::VectorXd beta = Eigen::VectorXd::Zero(columns.cols());
-    constexpr int kSteps = 8;
+    constexpr int kSteps = 8;  // bound of Newton's method, which ends earlier once its moves are small
+    // Largest change of a coefficient of the log variance per step; a larger one may overshoot.
     constexpr double kLongest = 1;
     for (int step = 0; step < kSteps; ++step) {
       Eigen::VectorXd score = -beta / (kPrior_sd * kPrior_sd);

@@ -22,6 +22,7 @@ struct NoiseForm {
   /// the coefficients.
   std::function<proto::Function(const Eigen::VectorXd& coefficients, double level)> scale;
 
+  /// Folds of the cross-validation. More leave more samples to learn from, and cost a fit each.
   static constexpr std::size_t kFolds = 6;
 };
 

@@ -18,7 +18,7 @@
 namespace kilotwin::identify {
 namespace {
 
-constexpr std::size_t kFewestSpells = 5;
+constexpr std::size_t kFewestSpells = 5;  // spells; with fewer, stalls count as no gain
 /// As of effects on the noise.
 constexpr double kLeastStallGain = 10, kLeastStallErrors = 3;
 constexpr std::size_t kRobotFolds = 6;
@@ -45,12 +45,14 @@ std::pair<Stalls, double> first_fit(const SpellScan& scan, const MotionModel& mo
 
 /// The most likely speed within spells. 0 if the data do not exclude it.
 double fitted_speed(const SpellScan& scan, const MotionModel& model, Stalls stalls) {
+  // First and last step of the speed, its bound, and nat by which it must exceed standstill. A higher bound takes slow
+  // motion for spells; a smaller last number states speeds that are chance.
   constexpr double kFirst = 0.2, kLast = 0.05, kMost = 0.9, kClear = 3;
   const auto value = [&](double speed) {
     stalls.gain = speed;
     return scan.scan(model, stalls).gain;
   };
-  constexpr int kMostMoves = 30;
+  constexpr int kMostMoves = 30;  // bound on the moves, each at the cost of up to two scans
   double best = stalls.gain, gain = value(best);
   int moves = 0;
   for (double step = kFirst; step >= kLast && moves < kMostMoves; ++moves) {
@@ -73,6 +75,8 @@ double fitted_speed(const SpellScan& scan, const MotionModel& model, Stalls stal
 /// The speed within spells by a step of Newton's method, and half of its 95 % interval. The latter follows from the spread of the tracks'
 /// slopes (the sandwich estimator), since tracks differ by more than their noise.
 std::pair<double, double> speed_and_half(const SpellScan& scan, const MotionModel& model, Stalls stalls) {
+  // Step of the difference quotients and of the result, and least curvature. Where gains are flat, a smaller curvature
+  // would make a longer step and a wider interval.
   constexpr double kStep = 0.05, kLeastCurvature = 1;
   const double speed = stalls.gain;
   const auto gains = [&](double at) {
@@ -95,7 +99,7 @@ std::pair<double, double> speed_and_half(const SpellScan& scan, const MotionMode
 
 /// Refits everything beside the spells.
 SpellScan::Found refit(const SpellScan& scan, const Fitter& fitter, SpellScan::Found found, FitState& state) {
-  constexpr int kRounds = 2;
+  constexpr int kRounds = 2;  // rounds of spells and fit, the first with the speed; more cost a fit each
   for (int round = 0; round < kRounds; ++round) {
     std::vector<std::vector<float>> shares;
     for (TrackSpells& track : found.tracks) shares.push_back(std::move(track.share));

@@ -17,7 +17,10 @@
 namespace kilotwin::bristle {
 namespace {
 
+/// Length of the line through the latest positions, time between instants and before the first one, and rounding of the
+/// horizon. A longer line is less noisy and shows older motion; more instants overlap.
 constexpr double kLine_s = 0.5, kEvery_s = 1, kFirst_s = 3, kNear_s = 0.1;
+/// Rows of a line, less one; with fewer, its slope is too uncertain for an instant.
 constexpr std::size_t kFewest = 4;
 /// Weight of the population's values in a run's own estimates, in instants.
 constexpr double kPrior = 6;

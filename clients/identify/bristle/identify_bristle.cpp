@@ -118,6 +118,7 @@ class Folds {
   }
 
  private:
+  /// Folds of the runs. More leave more runs to learn from, and cost a model each.
   static constexpr std::size_t kFolds = 4;
   double horizon_s_;
   std::vector<BristleModel> models_;
@@ -190,6 +191,7 @@ google::protobuf::Struct parameters_of(BristleEffect effect, const BristleModel&
 /// Mean speed by direction of motion, minus the run's own: a drift makes one direction faster.
 identification::CovariatePlot speed_by_direction(const std::vector<BristleInstant>& instants, const BristleModel& m,
                                                  bool drifting) {
+  // Sectors of the plot; more show finer differences, from fewer instants each.
   constexpr std::size_t kSectors = 8;
   std::map<std::size_t, std::vector<std::complex<double>>> ways;
   for (const BristleInstant& i : instants) ways[i.run].emplace_back(i.vx_mm_s, i.vy_mm_s);

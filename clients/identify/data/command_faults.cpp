@@ -13,7 +13,7 @@ namespace {
 
 // --- clocks ---
 
-constexpr double kSlowestClock = 0.5, kFastestClock = 2;
+constexpr double kSlowestClock = 0.5, kFastestClock = 2;  // rates that are tried; clocks beyond them are not found
 // Grid of clock rates: neighbouring rates move the end of the compared interval by this time.
 constexpr double kStep_s = 0.4;
 // A run's clock is wrong if another rate passes four bounds: gain in log-likelihood per robot and hundred motion

@@ -194,7 +194,7 @@ void demand_plane_axes(const MeasuredSet& set, const std::string& from) {
       }
     }
   }
-  constexpr std::size_t kFewestTurns = 20;
+  constexpr std::size_t kFewestTurns = 20;  // turns; with fewer, chance could refuse good data
   // A faulty wheel may turn a robot against its commands, but not nearly all robots.
   if (with + against >= kFewestTurns && against > 4 * with)
     throw UserError(
@@ -206,6 +206,8 @@ void demand_plane_axes(const MeasuredSet& set, const std::string& from) {
 
 /// Discs of 33 mm cannot overlap by half: positions in centimetres look so.
 void demand_room(const MeasuredSet& set, const std::string& from) {
+  // Interval of the instants, and sightings at all of them, from which on data are judged. Fewer sightings could refuse
+  // good data by chance; more would let short recordings pass.
   constexpr double kInstant_s = 10, kFewestRobots = 12;
   std::size_t robots = 0, overlap = 0;
   for (const Run& run : set.runs) {
@@ -238,6 +240,8 @@ void demand_room(const MeasuredSet& set, const std::string& from) {
 
 /// Headings of robots that drive straight are the directions of their motion.
 void demand_headings_of_motion(const MeasuredSet& set, const std::string& from) {
+  // Duration and least way of a drive, and drives from which on data are judged. Over shorter ways, noise decides the
+  // direction; with fewer drives, chance could refuse good data.
   constexpr double kLasts_s = 2, kMoved_mm = 5, kFewestDrives = 20;
   // Mean resultant lengths, 0..1, and a turn beyond which no camera or marker is turned unwittingly.
   constexpr double kAgree = 0.9, kDisagree = 0.5, kMuch_rad = M_PI / 3;

@@ -15,6 +15,8 @@
 namespace kilotwin::identify {
 namespace {
 
+/// Ends of equal parts of a plan, between which its information is interpolated. More follow it closer, and cost a matrix
+/// each.
 constexpr std::size_t kCheckpoints = 24;
 /// Least distances at the start: of a centre from the wall, and of two centres.
 constexpr double kFromWall_mm = 60, kApart_mm = 80;
@@ -98,6 +100,7 @@ void place_anywhere(RecordingPlan& plan, std::size_t r, std::size_t others, Draw
                half_y = std::max(1.0, plan.arena.height_mm / 2 - kFromWall_mm);
   PlannedRobot& robot = plan.robots[r];
   double most_mm = -1;
+  // Random places, of which the first far enough is taken, or the farthest; more find room among more robots.
   constexpr int kTries = 30;
   for (int n = 0; n < kTries && most_mm < kApart_mm; ++n) {
     const double x = draws.uniform(-half_x, half_x), y = draws.uniform(-half_y, half_y);

@@ -30,6 +30,7 @@ Eigen::Index add(DesignQuestion& question, DesignColumn column) {
 /// The columns of the base model, which all models share.
 std::vector<Eigen::Index> add_base(DesignQuestion& question, const identification::Base& sd) {
   const auto known = [](double value, double otherwise) { return value > 0 ? value : otherwise; };
+  // Step of the derivatives, mm/s and mm; with a larger one, tracks depart from the linear range.
   constexpr double kStep = 0.02;
   return {add(question, {"straight speed, mm/s", known(sd.straight_speed_mm_s(), kStraightSd_mm_s), kStep,
                          [](proto::Model& m, double by) {
@@ -62,6 +63,7 @@ std::function<void(proto::Model&, double)> more_of(std::vector<Effect> effects) 
 
 /// The range over which a trend of a covariate is normalised; none: the covariate has no order.
 std::optional<std::pair<double, double>> range_of(Function::Covariate c, double duration_s, double reach_mm) {
+  // Ranges of a trend over times since commands and over distances; wider ones make its slope smaller.
   constexpr double kCommand_s = 20, kNear_mm = 150;
   switch (c) {
     case Function::TIME:

@@ -29,6 +29,8 @@ bool Fitter::contacts_contradict_geometry(const FitState& state) const {
   std::size_t samples = 0;
   for (const TrackView& view : state.tracks.views())
     samples += view.track->held_out ? 0 : view.track->samples.size();
+  // Gain of the log likelihood from which on contacts contradict the geometry: nat, and nat per sample. Larger values
+  // overlook distortions; smaller ones take other noise for contacts.
   constexpr double kSure = 30, kEach = 0.002;
   return log_likelihood(trial) > with_noise + kSure + kEach * static_cast<double>(samples);
 }
@@ -38,7 +40,7 @@ void Fitter::fit_camera_distortion(FitState& state) const {
   const MotionModel before = model;
   set_uncertain_walls(model);
   model.walls = {};
-  constexpr int kPasses = 3;
+  constexpr int kPasses = 3;  // passes without walls; fewer bring the walls back before the map has settled
   for (int pass = 0; pass < kPasses; ++pass) {
     fit_noise(state);
     step(state);
@@ -60,6 +62,8 @@ void Fitter::resolve_walls(FitState& state) const {
 }
 
 bool Fitter::correct_camera_scale(FitState& state) {
+  // Relative distance from the disc diameter beyond which the contact distance is no error of scale, and factor that counts
+  // as no change. A larger first one accepts wrong distances; a smaller second one costs fits.
   constexpr double kNear = 0.15, kSame = 0.001;
   const std::vector<RobotPair> pairs = state.tracks.pairs();
   const std::optional<ContactDistance> apart = contact_distance(pairs);

@@ -119,6 +119,8 @@ double Fitter::fit_command_lag(FitState& state, double least_gain) const {
 }
 
 std::pair<double, double> Fitter::command_lag_interval(const FitState& state) const {
+  // Start of the search for an end of the interval, and distance from which on the end counts as unknown. Another start
+  // costs some steps.
   constexpr double kFirst_s = 0.01, kFarthest_s = 0.5;
   // Base parameters, biases and coefficients follow the lag by one step each.
   const auto value = [&](double lag_s) {

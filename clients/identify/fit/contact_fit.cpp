@@ -45,6 +45,8 @@ struct ContactPushes {
 }  // namespace
 
 double contact_range_of(const BaseParameters& base, bool headings) {
+  // Share of the offset between disc centre and tracked point by which places without headings may be off. A larger value
+  // counts more robots as in contact.
   constexpr double kMostly = 0.75;
   return kContactRange_mm + (headings ? 0 : kMostly * std::abs(base.centre_mm - base.ahead_mm));
 }
@@ -186,8 +188,8 @@ double Fitter::persistent_push_mm2_s(const MotionModel& model, const std::vector
     sum_mm2 += p.sum_mm2;
     time_s += p.time_s;
   }
-  constexpr std::size_t kFew = 10;
-  constexpr double kMost_mm2_s = 1e3;
+  constexpr std::size_t kFew = 10;     // contacts; with fewer, their mean square is too uncertain to be a noise
+  constexpr double kMost_mm2_s = 1e3;  // largest variance, the bound that the fit of the noise has, too
   return count < kFew ? 0 : std::min(sum_mm2 / time_s, kMost_mm2_s);
 }
 

@@ -41,6 +41,8 @@ void FilterBank::take(const Sample& sample) {
 }
 
 bool FilterBank::carry(Hypothesis& h, const Sample& sample) const {
+  // Nat, as kHopeless: a hypothesis that lost the track goes where another one followed it. A smaller value keeps it for
+  // longer.
   constexpr double kLost = 20;
   const double from_s = last_s();
   ContactGate gate;
@@ -105,6 +107,7 @@ void FilterBank::start(const Sample& sample) {
     hypotheses_.push_back({std::move(filter)});
   };
   if (TrackFilter::has_heading(sample)) return add(sample.heading_rad, std::sqrt(model_.noise.heading_rad2));
+  // Headings to start from, 20 degrees apart; each costs a filter, fewer may miss the true one.
   constexpr int kHeadings = 18;
   for (int i = 0; i < kHeadings; ++i) add(2 * M_PI * i / kHeadings, M_PI / kHeadings);
 }
@@ -137,6 +140,7 @@ void FilterBank::restart(const Sample& sample) {
 }
 
 void FilterBank::prune() {
+  // Nat below the best; a smaller value drops hypotheses that later samples would favour.
   constexpr double kHopeless = 20;
   // A weight that is no finite number is as good as none. If no weight is finite, all hypotheses stay, with equal weights.
   double best = -1e300;
@@ -147,6 +151,7 @@ void FilterBank::prune() {
   std::erase_if(hypotheses_,
                 [](const Hypothesis& h) { return !std::isfinite(h.log_weight) || h.log_weight < -kHopeless; });
   merge();
+  // Histories of spells; each costs a filter, fewer lose a spell that later samples would show.
   constexpr std::size_t kMostHistories = 6;
   if (!hypotheses_.front().spell || hypotheses_.size() <= kMostHistories) return;
   std::stable_sort(hypotheses_.begin(), hypotheses_.end(),

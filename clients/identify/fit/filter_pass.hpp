@@ -61,6 +61,7 @@ struct TrackView {
 
 /// Tells the filter the share of an interval in a spell. Where it is unsure, the interval gives no samples.
 inline void tell_spell(TrackFilter& filter, double share, double length_s) {
+  // Share nearer to 0 or 1 counts as known; a larger value makes samples of doubtful intervals.
   constexpr double kUnsure = 0.02;
   filter.in_spell(share, share * (1 - share) * length_s, share > kUnsure && share < 1 - kUnsure);
 }

@@ -82,6 +82,8 @@ double Fitter::fit_for_likelihood(FitState& state, int passes) const {
 }
 
 void Fitter::fit_until_settled(FitState& state) const {
+  // Passes of the first fit, and single ones that may follow. More cost time where a fit converges slowly; fewer leave it
+  // far from its end.
   constexpr int kFirst = 2, kMostMore = 6;
   // Beside a large error that the model lacked, a fit of two passes is far from its end; most fits are near it.
   constexpr double kHardly = 20, kHardlyOfGain = 0.02;

@@ -64,6 +64,7 @@ Equations equations_of(const Fitter& fitter, const FitState& state) {
   // The likelihood is flat along the common scale of the camera map, the speeds and the wheel base. A step must
   // not move along it, so that direction is removed.
   if (const Eigen::VectorXd by_scale = log_scale_by_coefficients(model); by_scale.size() > 0) {
+    // Standard deviation of the log scale, so small that steps keep it; a larger value lets them move along.
     constexpr double kHeld = 1e-4;
     const Eigen::VectorXd row = by_scale / kHeld;
     e.information.bottomRightCorner(row.size(), row.size()).noalias() += row * row.transpose();
@@ -170,6 +171,8 @@ std::optional<double> Fitter::step(FitState& state) const {
   struct Trial {
     double firmness, length;
   };
+  // Weights of the prior beside the information, and shares of the step, in the order of trial. More trials cost a
+  // likelihood each.
   constexpr std::array<Trial, 6> kTrials = {{{0, 1}, {10, 1}, {100, 1}, {100, 0.4}, {100, 0.16}, {100, 0.06}}};
   bool better = false;
   double likelihood = e.log_likelihood;

@@ -13,6 +13,8 @@
 namespace kilotwin::identify {
 namespace {
 
+/// Start of the search for an end of an interval, and distance from which on the end counts as unknown. Another start costs
+/// some steps.
 constexpr double kFirst_mm = 0.15, kFarthest_mm = 10;
 /// Samples by which the disc centre is judged. More would narrow its interval, and take a noticeable share of the time.
 constexpr std::size_t kSamplesOfCentre = 2000;
@@ -28,9 +30,10 @@ constexpr std::array<Side, 4> kSides = {{{&Walls::x_low_mm, &Sample::x_mm},
 
 /// Tracks of the fit that came near a wall, at most kMost.
 std::vector<const TrackView*> tracks_near(const FitState& state, const Side& side) {
-  constexpr std::size_t kMost = 4;
+  constexpr std::size_t kMost = 4;  // tracks; more narrow the interval, and cost time in proportion
+  // Distance from the wall, beside the offset of the disc centre; a larger one counts free samples.
   constexpr double kNear_mm = 8;
-  constexpr std::ptrdiff_t kFewest = 5;
+  constexpr std::ptrdiff_t kFewest = 5;  // samples near the wall; tracks without more of them tell nothing of it
   const BaseParameters& base = state.model.base;
   const double near_mm = kNear_mm + std::abs(base.centre_mm - base.ahead_mm);
   std::vector<const TrackView*> near;

@@ -15,6 +15,7 @@ struct LogLikelihood {
   void start(const TrackFilter&) {}
   void step(const StepRecord& record) { gate.step(record); }
   void update(const Innovation& innovation, const Sample&) {
+    // Nat; bound of one sample, so that no outlier decides alone; a value near 0 would hide true misfits.
     constexpr double kLeast = -1e3;
     const ContactGate::Counts counts = gate.update(innovation);
     if (counts == ContactGate::Counts::kAll || include_contacts)

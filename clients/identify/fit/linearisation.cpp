@@ -64,6 +64,7 @@ class Sensitivities {
     const Eigen::Vector3d pose = filter.belief().mean.head<3>();
     Eigen::Matrix2d by_place = Eigen::Matrix2d::Identity();
     if (model_.measures()) {
+      // Step of the difference quotient; a larger one blurs the bends of a map, a tiny one loses digits.
       constexpr double kStep_mm = 0.1;
       const Eigen::Vector3d here = model_.measured(pose[0], pose[1], pose[2], last_);
       by_place.col(0) = (model_.measured(pose[0] + kStep_mm, pose[1], pose[2], last_) - here).head<2>() / kStep_mm;
@@ -236,7 +237,7 @@ class Sensitivities {
                                                 static_cast<Eigen::Index>(block.basis.size()));
     const auto factor = [&](const double* values) {
       const double gain = 1 + own.dot(Eigen::Map<const Eigen::VectorXd>(values, own.size()));
-      constexpr double kLeast = 0.05;
+      constexpr double kLeast = 0.05;  // least gain; a smaller one makes columns that are divided by it larger
       return std::abs(gain) < kLeast ? kLeast : gain;
     };
     const bool both = block.target == Target::kGain;
@@ -371,6 +372,7 @@ class Sensitivities {
 
 /// Columns cost in proportion, their products by the square: one sub-step of the filter is the unit.
 void count_work(const TrackView& view, Eigen::Index columns) {
+  // Relative costs. The work limits of the search are in this unit: larger values end it earlier.
   constexpr double kByColumn = 0.1, kByProduct = 1.0 / 3000;
   const auto n = static_cast<double>(columns);
   if (view.work != nullptr)

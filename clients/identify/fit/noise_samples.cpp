@@ -109,7 +109,7 @@ std::map<std::uint32_t, NoiseRatio> noise_ratios_of(const std::vector<NoiseSampl
     stretch.sum += sample.whitened_square();
     stretch.count += 1;
   }
-  constexpr std::size_t kFewest = 3;
+  constexpr std::size_t kFewest = 3;  // stretches; with fewer, their spread gives no interval, and the robot none
   std::map<std::uint32_t, NoiseRatio> ratios;
   for (const auto& [robot, stretches] : robots) {
     if (stretches.size() < kFewest) continue;

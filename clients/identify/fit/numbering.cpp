@@ -73,6 +73,7 @@ double within(const std::vector<TrackBias>& tracks) {
 }  // namespace
 
 Numbering numbering_of(const Fitter& fitter, const FitState& base) {
+  // Random numberings; more make the p value finer, and cost time in proportion.
   constexpr std::size_t kTrials = 400;
   std::vector<TrackBias> tracks = track_biases(fitter, base);
   std::map<std::uint32_t, std::vector<std::size_t>> runs;

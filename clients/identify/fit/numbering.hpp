@@ -13,6 +13,8 @@ struct Numbering {
   double chance = 0;
   /// The robots differ, but numbers tell no more than random ones.
   [[nodiscard]] bool anew() const {
+    // Spread from which on robots differ, and p value from which on their numbers tell nothing. Smaller values report new
+    // numbers where there are none.
     constexpr double kDiffer = 5, kNoBetter = 0.05;
     return spread > kDiffer && chance > kNoBetter;
   }

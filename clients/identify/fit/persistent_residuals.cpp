@@ -16,7 +16,7 @@ struct PairSums {
 };
 
 PairSums sums_of(const std::vector<SpeedResidual>& all, std::size_t lag) {
-  constexpr double kSameTime_s = 1e-6;
+  constexpr double kSameTime_s = 1e-6;  // rounding of times; a larger value joins intervals across gaps
   PairSums sums;
   for (std::size_t i = lag; i < all.size(); ++i) {
     bool together = true;
@@ -34,8 +34,8 @@ PairSums sums_of(const std::vector<SpeedResidual>& all, std::size_t lag) {
 
 /// The covariance of pairs over the process variance; 0 within chance.
 double share_of(const std::vector<PairSums>& tracks) {
-  constexpr std::size_t kFewest = 4;
-  constexpr double kSure = 3;
+  constexpr std::size_t kFewest = 4;  // tracks; with fewer, their spread tells no standard error
+  constexpr double kSure = 3;         // standard errors; a smaller value takes chance for persistence
   PairSums all;
   for (const PairSums& t : tracks) all.products += t.products, all.weights += t.weights, all.process += t.process;
   if (tracks.size() < kFewest || !(all.process > 0)) return 0;

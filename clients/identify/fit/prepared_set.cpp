@@ -30,6 +30,8 @@ PreparedSet::PreparedSet(const MeasuredSet& set, std::uint32_t first_number)
     }
     neighbours_.push_back(std::move(neighbours));
   }
+  // Distance from the boundary of the visited places. A larger one counts free robots as at a wall; a smaller one overlooks
+  // robots at walls.
   constexpr double kMargin_mm = 12;
   const VisitedBoundary boundary(set, kMargin_mm);
   auto at_boundary = std::make_shared<std::vector<std::vector<bool>>>();
@@ -73,7 +75,7 @@ void PreparedSet::set_neighbours(std::size_t run, RunNeighbours neighbours) {
 
 std::vector<std::vector<const TrackView*>> PreparedSet::units() const {
   const std::vector<std::uint32_t> robots = set_->robots();
-  constexpr std::size_t kFewRobots = 6;
+  constexpr std::size_t kFewRobots = 6;  // robots; with fewer, each track is a unit, so that there are more units
   std::vector<std::vector<const TrackView*>> units(robots.size() < kFewRobots ? views_.size() : robots.size());
   for (std::size_t v = 0; v < views_.size(); ++v) {
     if (views_[v].track->held_out) continue;
@@ -135,6 +137,7 @@ void PreparedSet::update_traffic(const MotionModel& model) {
 
 Encounters PreparedSet::encounters() const {
   Encounters sum;
+  // Raster of the counts; a finer one costs time and counts the same encounter more often.
   constexpr double kEvery_s = 1;
   for (const TrackView& view : views_) {
     const double first_s = view.track->samples.front().time_s;

@@ -13,6 +13,7 @@ struct RobotPair;
 
 /// Counts of robots whose nearest neighbour overlaps them, and of those in a ring around that distance.
 struct Encounters {
+  /// Outer radius of the ring. A larger one gives more counts, from farther away, where the density may be another one.
   static constexpr double kRing_mm = 55;
   /// Smaller than a disc diameter, so that camera distortion does not make contacts look like overlaps.
   static constexpr double kInside_mm = 0.85 * kDiscDiameter_mm;

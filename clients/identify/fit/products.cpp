@@ -40,6 +40,7 @@ inline __attribute__((always_inline)) void add_tile(const double* rows, const do
 template <int lanes>
 inline __attribute__((always_inline)) void add_panels(const double* rows, const double* by, Eigen::Index count,
                                                       double* sums, Eigen::Index stride) {
+  // Sums in registers, as in add_tile.
   constexpr int kSums = 8, kVectors = kPanel / lanes, kColumns = kSums / kVectors;
   for (Eigen::Index c = 0; c < kPanel; c += kColumns)
     add_tile<lanes>(rows, by + c, count, sums + c * stride, stride, std::make_integer_sequence<int, kVectors>(),

@@ -19,7 +19,7 @@ inline constexpr double kProfileDropAtBound95 = 2.57;
 /// `first`: where the search starts. Infinite if it has not fallen so far at `farthest`.
 template <class Drop>
 double profile_distance(Drop&& drop, double first, double farthest, double most = kProfileDrop95) {
-  constexpr int kMostTries = 12;
+  constexpr int kMostTries = 12;    // points of the profile, often a fit each; fewer end farther from the drop
   const double near = 0.08 * most;  // 4 % of the distance
   double inside = 0, outside = INFINITY, at = std::min(first, farthest);
   for (int n = 0; n < kMostTries; ++n) {

@@ -12,6 +12,7 @@ double stay_probability(const Stalls& stalls, const SpellState& s, double length
 }
 
 SpellState after(const SpellState& before, bool in_spell, double share, double length_s, std::uint32_t what) {
+  // Bits of the latest 8 intervals, two each; with more, fewer histories merge.
   constexpr std::uint32_t kRecent = 0xffff;
   const double lasted_s = !in_spell ? 0 : before.in_spell ? before.lasted_s + length_s : share * length_s;
   return {in_spell, lasted_s, (before.recent << 2 | what) & kRecent};

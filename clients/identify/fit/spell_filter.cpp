@@ -10,6 +10,7 @@
 namespace kilotwin::identify {
 namespace {
 
+/// Histories; each costs a filter, fewer lose a spell that later samples would show.
 constexpr std::size_t kMostHypotheses = 6;
 /// A hypothesis this much less likely than the best is dropped, nat.
 constexpr double kMostBelow = 12;

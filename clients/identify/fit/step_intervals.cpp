@@ -25,7 +25,7 @@ double finest_of(const Axis& axis) {
 
 /// A step before all data is a constant.
 bool is_in_data(const Factor& f, double point) {
-  constexpr double kAlways = -1e5;
+  constexpr double kAlways = -1e5;  // value far before all data; points of constants lie before it
   return f.shape == Factor::Shape::kAtLeast && point > kAlways && (f.axis.of != Covariate::kTime || point > 0);
 }
 
@@ -102,7 +102,7 @@ std::vector<bool> jumping_products(const Basis& basis, const StepInterval& step)
 
 /// The block with the point of a step elsewhere, or with another radius, at most the farthest that has a list.
 Block moved(Block block, const StepInterval& step, double by) {
-  constexpr double kLeast_mm = 10;
+  constexpr double kLeast_mm = 10;  // least radius, within a disc, where no neighbour can be
   for (Factor& f : block.basis.factors) {
     if (is_radius_of(step, f)) {
       f.axis.within_mm = static_cast<float>(std::clamp(step.at + by, kLeast_mm, kListed_mm));

@@ -86,6 +86,7 @@ void TrackFilter::start(const Sample& sample, const Situation&, double heading_r
   if (measures_) {
     // Removes the measurement effects by fixed-point iteration.
     const Situation at = situation(sample.time_s, CommandState{}, {});
+    // Iterations; a stronger distortion needs more, and each costs an evaluation of the map.
     constexpr int kPasses = 6;
     for (int pass = 0; pass < kPasses; ++pass) {
       const Eigen::Vector3d seen = model_->measured(belief_.mean[0], belief_.mean[1], belief_.mean[2], at);
@@ -319,6 +320,8 @@ Innovation TrackFilter::update(const Sample& sample, const CommandState& command
   if (outliers_ >= kLostAfter) {
     // Restart at the measured position. The heading is measured, or gets a larger variance.
     out.lost = true;
+    // Bounds of the heading's standard deviation after a restart: the track was lost, so that it is unsure; 1.8 is that of
+    // any heading. A smaller upper bound would trust a wrong heading.
     constexpr double kLeast_rad = 0.4, kMost_rad = 1.8;
     const double known = std::clamp(3 * std::sqrt(belief_.covariance(2, 2)), kLeast_rad, kMost_rad);
     start(sample, at, out.size == 3 ? sample.heading_rad : belief_.mean[2],

@@ -15,7 +15,7 @@ namespace {
 /// Variance of the scores of clusters over what the information expects; 1 or more. Few clusters do not tell it. `covariance`: of the
 /// first columns.
 double dispersion_of(const std::vector<Unit>& units, const Eigen::MatrixXd& covariance) {
-  constexpr Eigen::Index kFewest = 40;
+  constexpr Eigen::Index kFewest = 40;  // clusters; with fewer, the dispersion counts as 1
   Eigen::Index clusters = 0;
   double sum = 0, expected = 0;
   const Eigen::Index n = covariance.rows();

@@ -51,6 +51,8 @@ double upper_wall(std::vector<Place> places, double noise_mm, Evidence fewest) {
 /// A side that no robot reached. The arena's centre is the origin if the sides of the other pair are symmetric about it; then the
 /// side is as far from it as the opposite one. Infinite without that, or if robots were beyond.
 double mirrored(double opposite_mm, double low_mm, double high_mm, double reached_mm) {
+  // Largest offset of a centred arena, as a share of its side, and way beyond the mirrored side that tracker noise may
+  // take. Larger values imply sides that are not there.
   constexpr double kNone = std::numeric_limits<double>::infinity(), kSymmetric = 0.005, kBeyond_mm = 4;
   const bool centred = std::abs(low_mm + high_mm) < kSymmetric * (high_mm - low_mm);
   if (!std::isfinite(low_mm) || !std::isfinite(high_mm) || !std::isfinite(opposite_mm) || !centred) return kNone;

@@ -11,6 +11,8 @@ namespace kilotwin::kilogrid {
 namespace {
 
 constexpr double kStep_s = SingleRobot::kStep_s;
+/// Time between predictions, and the earliest one. A finer raster costs time and judges overlapping stretches; a later
+/// start gives the filter more reports.
 constexpr double kEvery_s = 5, kFirst_s = 10;
 /// Probability of a report from anywhere, outside the reception model.
 constexpr double kAstray = 2e-4;

@@ -23,7 +23,7 @@ std::uint64_t export_cells(recorder::Reader& recording, const std::filesystem::p
         fmt::format("{}: the arena is {:g} x {:g} mm; a Kilogrid export needs sides that are multiples of {:g} mm",
                     recording.path().string(), floor.width_mm, floor.height_mm, 2 * floor.cell_mm));
   }
-  constexpr double kMost_s = 2;
+  constexpr double kMost_s = 2;  // period of the cells' reports; recordings with a longer one would lack some
   if (header.every_s() > kMost_s) {
     throw UserError(fmt::format(
         "{}: recorded every {:g} s; cells report every 2 s, so set recording.every_s to 2 or less and run again",

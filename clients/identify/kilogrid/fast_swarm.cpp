@@ -83,7 +83,7 @@ FloorRun simulate_fast(const FloorScene& scene, const Floor& floor, const FloorS
   std::vector<Place> before(robots.size());
   const auto steps = static_cast<std::int64_t>(scene.duration_s / SingleRobot::kStep_s);
   const double friction = proto::Physics().rim_friction();
-  constexpr int kPasses = 2;
+  constexpr int kPasses = 2;  // passes over close pairs, since parting one may close another; more cost time
   for (std::int64_t k = 0; k < steps; ++k) {
     pairs.sort(robots);
     if (model.neighbour_radius_mm() > 0) {

@@ -9,6 +9,7 @@ namespace kilotwin::kilogrid {
 
 /// Mean positions in successive time blocks per robot. NaN: fewer than two reports.
 struct FloorBlocks {
+  /// Length of a block. Longer ones average more reports, and hide motion that is shorter.
   static constexpr double kBlock_s = 10;
   std::vector<std::vector<double>> x_mm, y_mm;  ///< [robot][block]
   std::size_t blocks = 0;

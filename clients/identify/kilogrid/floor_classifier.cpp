@@ -91,10 +91,11 @@ class Logistic {
   Eigen::VectorXd weights_;
 };
 
-/// Boosted decision stumps: thresholds at sixteenths of single features, with shrinkage one half.
+/// Boosted decision stumps: thresholds at sixteenths of single features, with shrinkage.
 class Boosted {
  public:
   explicit Boosted(const Samples& s) {
+    // Stumps, and thresholds of a feature; more follow the training windows closer, and cost time.
     constexpr int kRounds = 150, kThresholds = 15;
     const Eigen::Index rows = s.x.rows();
     std::vector<std::vector<double>> thresholds;
@@ -128,6 +129,7 @@ class Boosted {
         for (std::size_t t = 0; t < own.size(); ++t) {
           below_g += g[t];
           below_h += h[t];
+          // Weight that pulls a stump's values to 0; a larger one shrinks those of few windows more.
           constexpr double kRidge = 5;
           const double low = below_g / (below_h + kRidge), high = (all_g - below_g) / (all_h - below_h + kRidge);
           const double gain = below_g * low + (all_g - below_g) * high;
@@ -137,6 +139,7 @@ class Boosted {
           }
         }
       }
+      // Share of a stump that counts; a smaller one needs more rounds, a larger one follows chance.
       constexpr double kRate = 0.3;
       best.low *= kRate;
       best.high *= kRate;
@@ -202,6 +205,7 @@ class Judgement {
 
 /// Mean area of both folds, and its standard error.
 std::pair<double, double> area_of(const std::vector<Judgement>& halves) {
+  // Resamples of the standard error; more make it less random, and cost time in proportion.
   constexpr int kResamples = 200;
   Dice dice(1);
   double mean = 0;

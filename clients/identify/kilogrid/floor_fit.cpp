@@ -24,6 +24,7 @@ Eigen::VectorXd weights_of(const Eigen::VectorXd& off) {
 /// selection of effects uses equal weights.
 const Eigen::VectorXd& importance() {
   static const Eigen::VectorXd all = [] {
+    // Weight relative to the others; a larger one fits windows at the cost of the rest.
     constexpr double kWindows = 2.5;
     Eigen::VectorXd v = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(statistic_count()));
     for (const StatisticGroup& group : statistic_groups()) {
@@ -104,6 +105,7 @@ Eigen::VectorXd best_steps(const Surrogate& surrogate, const FloorBox& box) {
   const Eigen::VectorXd weights = weights_of(surrogate.off).cwiseProduct(importance());
   // Coordinate descent with box constraints. Parameters without influence stay.
   Eigen::VectorXd residual = surrogate.off;
+  // Weight of the present parameters; a larger one makes steps shorter where statistics say little.
   constexpr double kStay = 3;
   for (int sweep = 0; sweep < 300; ++sweep) {
     for (Eigen::Index p = 0; p < columns; ++p) {

@@ -10,6 +10,8 @@
 
 namespace kilotwin::kilogrid::groups {
 
+/// Bins of the statistics: numbers of parts, or lower edges; lags, runs and stays in blocks. More bins show finer
+/// differences, from fewer blocks each.
 inline constexpr std::size_t kTimeBins = 16, kMiddleBins = 8;
 inline constexpr std::array kSteps_mm = {0.,  8.,  16., 24.,  32.,  40.,  50., 60.,
                                          70., 80., 90., 100., 110., 120., 150.};

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::string_view kHeader = "time_s,robot,x_mm,y_mm";
 constexpr std::array<std::string_view, 4> kColumns = {"time_s", "robot", "x_mm", "y_mm"};
-constexpr std::uint32_t kHighestRobot = 1'000'000;
+constexpr std::uint32_t kHighestRobot = 1'000'000;  // numbers above are refused as errors of the file
 /// Largest plausible displacement between cells: two cells and 20 mm/s.
 constexpr double kReach_mm = 150, kReach_s = 3;
 constexpr double kMostWrongRows = 0.02;  ///< share of steps; fewer count as single erroneous rows

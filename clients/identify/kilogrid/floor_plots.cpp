@@ -132,6 +132,8 @@ identification::Table table_of_motion(const FloorTarget& held_out, const FloorSt
     row(name + ": correlation between the halves of a run", "{:.2f}",
         [=](const auto& v) { return variance(v, 2) / variance(v, 1); });
   };
+  // Rate of blocks, and the step that floor_statistics.cpp takes squares about: another one here would give wrong
+  // variances.
   constexpr double kPerSecond = 1 / FloorBlocks::kBlock_s, kAboutSpeed_mm = 75;
   add_own("speed", kAboutSpeed_mm, kPerSecond, "speed on the open floor, mm/s", "{:.2f}");
   add_own("turn-bias", 0, kPerSecond, "mean turn rate, rad/s", "{:+.4f}");

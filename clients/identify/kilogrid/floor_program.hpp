@@ -49,7 +49,7 @@ class FloorProgram {
  private:
   enum class Walk : std::uint8_t { kBegin, kStraight, kTurn };
   enum class Avoid : std::uint8_t { kBegin, kTurn, kEscape };
-  static constexpr int kReadings = 4;
+  static constexpr int kReadings = 4;  // messages that one reading sums up; more make it less noisy, and later
 
   void walk(std::int64_t now);
   void avoid(std::int64_t now);

@@ -40,7 +40,7 @@ std::string hex(std::uint64_t hash) { return fmt::format("{:016x}", hash); }
 }  // namespace
 
 FloorDays divided(std::vector<FloorRun> train, std::vector<FloorRun> test) {
-  constexpr std::size_t kFewest = 3;
+  constexpr std::size_t kFewest = 3;  // runs; with fewer, none is spared for the choice beside a test set
   FloorDays days;
   days.report = std::move(test);
   const bool has_test = !days.report.empty(), spare = train.size() >= kFewest;

@@ -190,7 +190,7 @@ Selection choose(const FloorModel& model, const std::vector<FloorTerm>& candidat
   choice.unexplained = std::max(1.0, gains.with_all / all_by_chance);
   // Leave-one-run-out cross-validation.
   std::vector<FloorMisfit> alone, others;
-  constexpr std::size_t kFewestRuns = 3;
+  constexpr std::size_t kFewestRuns = 3;  // runs; with fewer, nothing is cross-validated
   for (std::size_t r = 0; runs >= kFewestRuns && r < runs; ++r) {
     std::vector<std::vector<RobotSums>> rest = target.set().runs;
     rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(r));

@@ -52,6 +52,7 @@ class Lines {
     const auto known =
         static_cast<Eigen::Index>(std::count_if(y.begin(), y.end(), [](double v) { return std::isfinite(v); }));
     if (known == rows) return line(x_, weight_, all_, Eigen::Map<const Eigen::VectorXd>(y.data(), rows));
+    // Values beyond the fitted numbers; with fewer, a statistic counts as independent of the parameters.
     constexpr Eigen::Index kSpare = 5;
     if (known < fitted_ + kSpare) return Eigen::VectorXd::Zero(columns);
     Eigen::MatrixXd x(known, x_.cols());

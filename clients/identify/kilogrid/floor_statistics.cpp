@@ -314,6 +314,8 @@ std::vector<RobotSums> robot_sums(const FloorRun& run, const Floor& floor) {
       extents[w - window < (last - window) / 2 ? 0 : 1].add(w->feature[kExtentFeature] / kExtentScale_mm);
     }
     window = last;
+    // Windows that each half of a run needs, and the extent that squares are taken about. Fewer windows give halves that
+    // differ by chance.
     constexpr double kFewestWindows = 3, kAboutExtent = 4.7;
     add_halves(sums, kExtent, extents, kAboutExtent, kFewestWindows);
     add_reports(sums, run.tracks[robot], blocks.x_mm[robot], floor.cell_mm);

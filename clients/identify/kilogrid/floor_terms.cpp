@@ -28,7 +28,7 @@ void set_episodes(Function& function, std::span<const double> v) {
 /// low-discrepancy sequence with increment `step`), so small swarms represent it. Independent tables use different
 /// steps.
 void add_table_of_robots(Effect& effect, double step, const std::function<double(double z)>& value) {
-  constexpr std::uint32_t kRobots = 256;
+  constexpr std::uint32_t kRobots = 256;  // robots with a value; a larger swarm needs a longer table
   proto::Table& table = *add_function(effect, Function::ROBOT).mutable_table();
   for (std::uint32_t robot = 0; robot < kRobots; ++robot) {
     const double share = (robot + 0.5) * step;
@@ -39,6 +39,8 @@ void add_table_of_robots(Effect& effect, double step, const std::function<double
 
 /// Gains distributed as z + skew (z^2 - 1).
 void add_speeds(FloorSettings& settings, double sd, double skew) {
+  // Increment of the sequence, and least gain: at -1 robots would stand still. A lower one would let robots drive
+  // backwards.
   constexpr double kGolden = 0.6180339887498949, kSlowest = -0.95;
   add_table_of_robots(add_effect(settings, "speed-of-robots", Effect::WHEEL_GAIN), kGolden, [=](double z) {
     return std::max(sd * (z + skew * (z * z - 1)) / std::sqrt(1 + 2 * skew * skew), kSlowest);
@@ -47,7 +49,7 @@ void add_speeds(FloorSettings& settings, double sd, double skew) {
 
 /// Straight speeds distributed as z + skew (z^2 - 1). Turning speeds and biases stay.
 void add_straight_speeds(FloorSettings& settings, double sd_mm_s, double skew) {
-  constexpr double kGolden = 0.6180339887498949;
+  constexpr double kGolden = 0.6180339887498949;  // increment of the sequence, as of other speeds
   Effect& effect = add_effect(settings, "straight-speed-of-robots", Effect::WHEEL_OFFSET);
   effect.add_during(proto::STRAIGHT);
   const double slowest_mm_s = 0.5 - settings.model.motion().straight_speed_mm_s();
@@ -58,6 +60,7 @@ void add_straight_speeds(FloorSettings& settings, double sd_mm_s, double skew) {
 
 /// Turn rates distributed as z + tail z^3.
 void add_turning(FloorSettings& settings, double sd, double tail) {
+  // Increment other than kGolden, so that turning does not depend on the speed.
   constexpr double kSilver = 0.41421356237309505;
   const double scale = sd / std::sqrt(1 + 6 * tail + 15 * tail * tail);
   add_table_of_robots(add_effect(settings, "turning-of-robots", Effect::TURN_RATE), kSilver,

@@ -47,6 +47,7 @@ struct NullWalls {
   double misfit;  ///< remaining misfit
 };
 NullWalls by_chance(const FloorModel& model, const FloorTarget& target, int rounds, std::uint64_t seed) {
+  // Simulated sets; more make the bound less uncertain, and cost a fit each; kQuantile is for ten.
   constexpr std::size_t kSets = 10;
   const auto sums = [&](const FloorModel& of, std::uint64_t number) {
     std::vector<std::vector<RobotSums>> runs;

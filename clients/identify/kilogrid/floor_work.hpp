@@ -12,6 +12,7 @@ namespace kilotwin::kilogrid {
 /// In the order of their first units; the search repeats kEffect.
 enum FloorWork { kBase, kEffect, kWalls, kElimination, kChoice, kPredictions, kClassifier, kFloorReport };
 
+/// Effects that a search may add. More cost a test of all candidates and a fit each.
 inline constexpr int kMostEffects = 6;
 
 /// A unit that begins. `effects`: of the model, with one that the unit adds.

@@ -29,6 +29,7 @@ struct Factor {
     /// over kDirectionUnit_rad
     kPointShift,
   };
+  /// Unit of a direction: 1 mm at a distance of 1 m, so that steps of directions and of places are alike.
   static constexpr double kDirectionUnit_rad = 1e-3;
   Shape shape = Shape::kLinear;
   Axis axis, and_axis;

@@ -71,6 +71,7 @@ LinearMap linear_map_of(Term& term) {
 }  // namespace
 
 void add_pairs(const RunNeighbours& run, std::size_t robots, std::uint32_t number, std::vector<RobotPair>& to) {
+  // Gap after which two robots meet anew; a shorter one counts one encounter as several.
   constexpr double kAnew_s = 5;
   const auto stride = static_cast<std::size_t>(kEvery_s / RunNeighbours::kRaster_s);
   std::size_t encounter = to.empty() ? 0 : to.back().encounter;
@@ -96,7 +97,7 @@ void add_pairs(const RunNeighbours& run, std::size_t robots, std::uint32_t numbe
 }
 
 std::optional<ContactDistance> contact_distance(const std::vector<RobotPair>& pairs) {
-  constexpr std::size_t kFewest = 12;
+  constexpr std::size_t kFewest = 12;  // encounters; with fewer, no contact distance is stated
   std::array<double, kBins> counts{};
   std::size_t encounters = 0, last = 0;
   for (const RobotPair& pair : pairs) {
@@ -126,6 +127,8 @@ std::optional<ContactDistance> contact_distance(const std::vector<RobotPair>& pa
     double edge_mm, value;
   };
   std::vector<Tried> tried;
+  // Edges that are tried, so far within the counted distances that some lie on either side. Wider bounds would fit edges to
+  // a few pairs.
   constexpr double kFirst_mm = kLow_mm + 3, kLast_mm = kHigh_mm - 6;
   const auto edges = static_cast<int>(std::ceil((kLast_mm - kFirst_mm) / kBin_mm));
   for (int i = 0; i < edges; ++i) {
@@ -140,7 +143,7 @@ std::optional<ContactDistance> contact_distance(const std::vector<RobotPair>& pa
   }
   const Tried best = *std::max_element(tried.begin(), tried.end(),
                                        [](const Tried& a, const Tried& b) { return a.value < b.value; });
-  constexpr double kSure = 12;
+  constexpr double kSure = 12;  // nat over robots that do not touch; a smaller value takes chance for contacts
   if (best.value < nothing + kSure) return std::nullopt;
   double sum = 0, mean = 0, square = 0;
   for (const Tried& t : tried) {
@@ -156,7 +159,7 @@ std::optional<ContactDistance> contact_distance(const std::vector<RobotPair>& pa
 
 ScaleConstraint::ScaleConstraint(const MotionModel& model, const std::vector<RobotPair>& pairs, double relative_sd)
     : relative_sd_(relative_sd) {
-  constexpr std::size_t kMost = 300;
+  constexpr std::size_t kMost = 300;  // pairs, at most about; more cost time for each model that is tried
   const std::size_t every = pairs.size() / kMost + 1;
   for (std::size_t i = 0; i < pairs.size(); i += every) {
     for (const bool along_x : {true, false}) {

@@ -220,7 +220,7 @@ std::string amplitudes_in_words(const Function& f) {
   if (f.has_steps() && f.steps().at_size() > 0) {
     const proto::Steps& steps = f.steps();
     std::string words = fmt::format("times {:.2f} at first", steps.value(0));
-    constexpr int kMost = 3;
+    constexpr int kMost = 3;  // steps in words; more make the sentence longer
     for (int i = 0; i < std::min(steps.at_size(), kMost); ++i)
       words += fmt::format(", {:.2f} from {} on", steps.value(i + 1), place(steps.at(i), f));
     return words;
@@ -340,7 +340,7 @@ MapSum sum_of(const std::vector<const Effect*>& effects) {
   }
   MapSum sum;
   if (!(low_x < high_x && low_y < high_y)) return sum;
-  constexpr int kAcross = 40;
+  constexpr int kAcross = 40;  // raster of the map, for its quantiles in words
   for (int i = 0; i < kAcross; ++i) {
     const double part = (i + 0.5) / kAcross;
     sum.x_mm.push_back(low_x + part * (high_x - low_x));
@@ -400,7 +400,7 @@ Sorted sorted(const std::vector<Effect>& effects) {
 }  // namespace
 
 std::string size_in_words(const std::vector<Effect>& effects) {
-  constexpr std::size_t kMost = 3;
+  constexpr std::size_t kMost = 3;  // parts of the sentence
   std::vector<std::string> parts;
   const Amplitudes shown = without_amplitudes(effects);
   const Sorted all = sorted(shown.curves);

@@ -175,6 +175,7 @@ Arc arc_of(const Rates& r, double wheel_base_mm, double heading_rad, double h_s)
   const double turn = (r.right_mm_s - r.left_mm_s) / wheel_base_mm, forward = r.forward_mm_s();
   // sin(half) / half. The series is exact to the last digit at small angles, as in nearly all steps.
   const double half = turn * h_s / 2, half2 = half * half;
+  // Half of the turn in a step; a larger value takes the series where it loses digits.
   constexpr double kLittle_rad = 0.06;
   const double shorter =
       std::abs(half) < kLittle_rad ? 1 - half2 / 6 * (1 - half2 / 20 * (1 - half2 / 42)) : std::sin(half) / half;

@@ -29,6 +29,8 @@ struct Centres {
 /// Neighbour views of all tracks of a run.
 class RunNeighbours {
  public:
+  /// Time between the instants of the views. A finer raster costs time and memory; a coarser one shows neighbours where
+  /// they were.
   static constexpr double kRaster_s = 0.25;
   /// A robot is absent in gaps longer than this, s.
   static constexpr double kGap_s = 4;

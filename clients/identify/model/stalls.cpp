@@ -34,6 +34,8 @@ double survival_beyond(const Stalls& stalls, double t_s) {
 
 /// Log likelihood of the durations, given that each was seen, plus the prior.
 double log_posterior(const std::vector<Spell>& spells, double least_s, const Stalls& stalls) {
+  // Middle and standard deviations of the prior of a law. Larger deviations leave more to the spells; smaller ones pull
+  // laws of few spells to the middle.
   constexpr double kTail = 2.5, kTail_sd = 0.6, kScale_s = 5, kScale_sd = 1.5,
                    kShape_sd = 0.6;  // of the logarithms
   const double unseen = stalls.tail * std::log1p(power_of(stalls, least_s)), of_scale = std::log(stalls.scale_s);
@@ -53,6 +55,8 @@ double log_posterior(const std::vector<Spell>& spells, double least_s, const Sta
 /// Calls each(law, log posterior) for laws of the durations on a grid that is even in the logarithms of scale, tail and shape.
 template <class Each>
 void for_each_law(const std::vector<Spell>& spells, double least_s, const Stalls& stalls, Each&& each) {
+  // Bounds and numbers of points of the grid. Wider bounds or more points cost time in proportion; laws beyond the bounds
+  // are not found.
   constexpr double kLeast_s = 0.3, kMost_s = 100, kLeastTail = 1.2, kMostTail = 12, kLeastShape = 1, kMostShape = 8;
   constexpr int kScales = 60, kTails = 40, kShapes = 7;
   const auto on_grid = [](double least, double most, int i, int count) {
@@ -134,6 +138,7 @@ void fit_lengths(const std::vector<Spell>& spells, double least_s, Stalls& stall
 
 std::pair<double, double> mean_length_interval_s(const std::vector<Spell>& spells, double least_s,
                                                  const Stalls& stalls) {
+  // Share on each side of a 95 % interval, and nat below the best beyond which laws do not count.
   constexpr double kTail = 0.025, kNegligible = 30;
   std::vector<std::pair<double, double>> means;  // with their log posterior
   double best = -std::numeric_limits<double>::infinity(), all = 0;

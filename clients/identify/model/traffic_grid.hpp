@@ -60,6 +60,8 @@ class TrafficGrid {
   [[nodiscard]] float kept(const Content& c, double now_s) const {
     return cells_.forget_s <= 0 || c.value == 0 ? c.value : faded(c.value, c.at_s, now_s);
   }
+  /// Distance from the middle to the sides. Places beyond count in the outermost cells; a larger value costs memory by the
+  /// square.
   static constexpr double kReach_mm = 1600;
   /// Index of the first content of a cell.
   [[nodiscard]] std::size_t cell(double x_mm, double y_mm) const {

@@ -8,6 +8,7 @@
 namespace kilotwin::identify {
 namespace {
 
+/// Width of strips along a side; narrower ones follow the boundary closer, from fewer samples each.
 constexpr double kStrip_mm = 30;
 
 /// The upper quantile: the value that `share` of the values exceed, and at least `fewest` of them. Trackers
@@ -29,6 +30,7 @@ VisitedBoundary::VisitedBoundary(const MeasuredSet& set, double margin_mm)
         for (const Sample& s : track.samples) along.push_back(side.of_x ? s.y_mm : s.x_mm);
     if (along.empty()) continue;
     for (const double a : along) downwards.push_back(-a);
+    // Share of the samples beyond the boundary; a larger value moves it inwards.
     constexpr double kOutliers = 5e-4;
     const double high = near_the_end(along, 3, kOutliers), low = -near_the_end(downwards, 3, kOutliers);
     const auto strips = static_cast<std::size_t>(std::max(1.0, std::round((high - low) / kStrip_mm)));

@@ -6,6 +6,8 @@
 namespace kilotwin::identify {
 namespace {
 
+/// Runs from which on the last quarter of them is held out, else robots from which on every fourth is. With fewer of both,
+/// the second of two runs is held out, or nothing.
 constexpr std::size_t kRunsToHoldOut = 3, kRobotsToHoldOut = 4;
 
 HeldOut held_out_of(const MeasuredSet& train, Tracks of) {
@@ -79,6 +81,7 @@ void hold_out_part(MeasuredSet& set) {
 }
 
 void hold_out_for_choice(MeasuredSet& set) {
+  // Robots, or tracks, of which one chooses; a larger value leaves more to the fit, less to the choice.
   constexpr std::size_t kOneIn = 5;
   if (set.tracks() < kOneIn) return;
   const std::vector<std::uint32_t> robots = set.robots();

@@ -88,6 +88,7 @@ class JointForecast {
   }
   /// Advances to a time. Robots see each other on a time raster.
   void advance_to(double to_s) {
+    // Raster, as of RunNeighbours; a finer one costs time, a coarser one shows older places.
     constexpr double kRaster_s = 0.25;
     end_s_ = to_s;
     while (now_s_ < to_s - 1e-9) {
@@ -306,7 +307,7 @@ class TrafficRecord {
 
 /// The end of a run is unknown. It may last until the next frame, which need not exist.
 double end_of(const std::vector<Sample>& samples) {
-  constexpr double kFrames = 2;
+  constexpr double kFrames = 2;  // mean intervals between samples; a larger value predicts beyond the end of a run
   const double span_s = samples.back().time_s - samples.front().time_s;
   return samples.back().time_s +
          kFrames * span_s / static_cast<double>(std::max<std::size_t>(samples.size() - 1, 1));
@@ -335,7 +336,7 @@ const Sample* sample_near(const Track& track, double time_s, double reach_s) {
 }
 
 std::optional<Eigen::Vector2d> error_of(const Track& track, const Forecast& f) {
-  constexpr double kSame_s = 1e-9;
+  constexpr double kSame_s = 1e-9;  // rounding of times
   if (std::isnan(f.sample_s)) return std::nullopt;
   const Sample* const seen = sample_near(track, f.sample_s, kSame_s);
   if (seen == nullptr) return std::nullopt;

@@ -12,6 +12,7 @@
 namespace kilotwin::identify {
 namespace {
 
+/// Bootstrap draws; more make the ends of intervals less random, and cost time in proportion.
 constexpr std::int64_t kDraws = 2000;
 
 double root_mean(double sum, std::size_t rows) { return rows > 0 ? std::sqrt(sum / static_cast<double>(rows)) : 0; }
@@ -35,6 +36,7 @@ struct Window {
 
 /// Whether two robots had the same commands in a time interval, up to small shifts of the changes.
 bool same_commands(const Track& a, const Track& b, double from_s, double to_s) {
+  // Shift of a change; a larger value groups windows of different motion, a smaller one fewer windows.
   constexpr double kApart_s = 0.25;
   const auto changes = [&](const Track& track) {
     std::vector<CommandChange> out;
@@ -113,7 +115,7 @@ std::optional<ErrorBounds> bounds_of(const MeasuredSet& set, const PredictionErr
 }
 
 std::optional<StretchBounds> bounds_of(const std::vector<Stretch>& stretches) {
-  constexpr std::size_t kFewest = 6;
+  constexpr std::size_t kFewest = 6;  // stretches; with fewer, the errors get no interval from them
   if (stretches.size() < kFewest) return std::nullopt;
   const Random random(20180729);
   const auto count = static_cast<double>(stretches.size());
@@ -142,6 +144,7 @@ std::optional<StretchBounds> bounds_of(const std::vector<Stretch>& stretches) {
 
 std::optional<Replicates> replicates_of(
     const std::vector<std::pair<const MeasuredSet*, const std::vector<Forecast>*>>& sets, double horizon_s) {
+  // Degrees of freedom; with fewer, the spread of repeated motion is too uncertain to be stated.
   constexpr std::size_t kFewest = 30;
   // By robot and time, ms.
   std::map<std::pair<std::uint32_t, std::int64_t>, std::vector<Window>> at;

@@ -13,7 +13,7 @@ struct RunValues {
 
 /// A term with one column per run has one value per run. With curves over time for each run: the values along the curves.
 RunValues values_of(const Term& term) {
-  constexpr int kAlong = 20;
+  constexpr int kAlong = 20;  // values along a curve; more follow sharper changes
   RunValues out;
   if (term.blocks.size() != 1 || is_measured(term.blocks.front().target)) return out;
   const Block& block = term.blocks.front();
@@ -55,6 +55,7 @@ RunAmplitude::RunAmplitude(const MotionModel& model, std::uint32_t run) {
     const double square = (values - mean).square().sum() / degrees * count / all;
     const double sd = std::sqrt(square * (1 + 1 / count));
     if (!(sd > 0)) continue;
+    // Amplitudes on each side of the mean; each costs a model that forecasts, fewer make steps coarser.
     constexpr int kSide = 6;
     constexpr double kFarthest = 4;  // standard deviations
     for (int i = -kSide; i <= kSide; ++i) {

@@ -58,6 +58,7 @@ proto::Model renumbered(const proto::Model& model, const Scene& scene) {
 /// lower.
 void add_wall(proto::Experiment& experiment, bool across_x, double line_mm, int outwards, double length_mm) {
   if (!std::isfinite(line_mm)) return;
+  // Thickness, so that no robot gets through; the face where robots touch it does not depend on it.
   constexpr double kThick_mm = 200;
   const double middle_mm = line_mm + outwards * (kRadius_mm + kThick_mm / 2);
   proto::Obstacle& wall = *experiment.add_obstacle();

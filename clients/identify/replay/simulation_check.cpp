@@ -14,6 +14,8 @@
 namespace kilotwin::identify {
 namespace {
 
+/// Simulations of a model, at most and at least. More make statistics less random and cost time; a set too large for the
+/// least number is not checked.
 constexpr std::size_t kMostSeeds = 8, kFewestSeeds = 2;
 /// Bound on robots times ticks over all simulations of a model: about ten seconds of one core.
 constexpr double kMostRobotTicks = 3e7;

@@ -12,8 +12,9 @@
 namespace kilotwin::identify {
 namespace {
 
+/// Bins of a histogram, and of the time of a run. More show finer differences, from fewer samples each.
 constexpr std::size_t kBins = 36, kTimeBins = 12;
-constexpr double kWallBins_mm = 20;
+constexpr double kWallBins_mm = 20;  // width of the bins; finer ones have fewer samples each
 /// A robot this close to a wall counts as at the wall, mm.
 constexpr double kAtWall_mm = 8;
 /// Without headings, a turn is measured between two displacements longer than this, mm.

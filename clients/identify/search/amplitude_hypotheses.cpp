@@ -127,7 +127,7 @@ void of_known_and_more(DictionaryBuilder& make, const Extent& extent, const Targ
   since.warp = 1;
   beside("time_since_command", since, {1, 2, 5});
   if (!extent.neighbours) return;
-  constexpr std::uint8_t kRadius = 8;
+  constexpr std::uint8_t kRadius = 8;  // index in kNeighbourRadii_mm: 120 mm, beyond which neighbours do not count
   Factor near = over(Shape::kTaper, Covariate::kNearest, 0, kNeighbourRadii_mm[kRadius], 3);
   near.axis.radius = kRadius;
   beside("neighbours", near, {1, 3});
@@ -136,6 +136,7 @@ void of_known_and_more(DictionaryBuilder& make, const Extent& extent, const Targ
 }  // namespace
 
 void add_amplitude_hypotheses(DictionaryBuilder& make, const Extent& extent, const std::vector<Term>& terms) {
+  // Robots; with more, no amplitude of each robot is tried, which would take a column per robot.
   constexpr std::size_t kMostRobots = 40;
   for (const Term& whole : terms) {
     const Term term = main_part(whole);

@@ -149,6 +149,7 @@ class Instant {
  private:
   static Normal prior() {
     Numbers precision;
+    // Prior precision: its standard deviation is the largest shift; a larger value pulls shifts towards 0.
     constexpr double kMm = 1 / (kLargest_mm * kLargest_mm);
     precision << kMm, kMm, kMm, kMm, kMm, kMm, 1 / (kLargest_rad * kLargest_rad);
     return precision.asDiagonal();

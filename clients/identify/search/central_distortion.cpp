@@ -30,6 +30,7 @@ const Factor* free_map(const Term& term) {
 
 /// Places at which robots were seen, at most some thousand.
 std::vector<Eigen::Vector2d> places_of(const FitState& state) {
+  // Places of the fit to a free map; more cost time in proportion and follow the map closer.
   constexpr std::size_t kMostPlaces = 4000;
   std::size_t samples = 0, n = 0;
   for (const auto& unit : state.tracks.units())
@@ -46,6 +47,8 @@ std::vector<Eigen::Vector2d> places_of(const FitState& state) {
 /// from there converge; from a scale of one they may not.
 Term nearest_to(const Term& free, const Factor& rest, const Factor& scale,
                 const std::vector<Eigen::Vector2d>& places) {
+  // Standard deviations: of a place of the free map, and of the priors of shifts and scales. The first is far below the
+  // others, so that the map decides; smaller priors would pull the term towards none.
   constexpr double kPosition_mm = 0.1, kRest_mm = 10, kScale = 0.2;
   Term near = free;
   near.blocks = {{Target::kMeasuredX, Basis{{rest}}, kAlways},

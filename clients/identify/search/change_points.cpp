@@ -17,7 +17,10 @@ namespace {
 
 using Shape = Factor::Shape;
 
+/// Instants of the coarsest raster, and steps that one term may get. More instants find steps closer together and cost a
+/// column each per target; more steps follow a curve that is smooth.
 constexpr std::size_t kMostPoints = 150, kMostSteps = 12;
+/// Nat beyond the price of the choice, for a further step; a smaller value adds steps that are chance.
 constexpr double kLeastGain = 2;
 /// Finest raster of instants. A wheel of 20 mm/s moves by 0.8 mm in this time, about the noise of a tracked position.
 /// Finer rasters cost a linearisation each, and no data locate an instant so well.
@@ -188,6 +191,8 @@ double bends(const Fitter& fitter, const FitState& state, std::size_t place) {
 /// Adds the steps to the model and refines their times on finer rasters. False if their order changes.
 bool put_steps(const Fitter& fitter, FitState& state, std::size_t place, const Steps& steps, double apart_s) {
   MotionModel& model = state.model;
+  // Points of a finer raster on each side of an instant. A step is a fifth of the last one, so that six reach past the
+  // neighbouring points; more points leave fewer steps within kMostColumns.
   constexpr int kSide = 6, kRaster = 2 * kSide + 1;
   const std::size_t home = place;
   std::vector<double> at = steps.at_s;
@@ -273,7 +278,7 @@ bool is_over_time(const Term& term, std::initializer_list<const TargetGroup*> gr
 /// Returns whether the steps took its place.
 bool became_other_motion(const Fitter& fitter, FitState& state, std::size_t place, double cost, bool in_world,
                          const StepRaster& raster) {
-  constexpr double kSurely = 3;
+  constexpr double kSurely = 3;  // nat, a Bayes factor of 20: with less, the motion stays as it was found
   Steps steps;
   for (const Target target :
        in_world ? std::array{Target::kMeasuredX, Target::kMeasuredY} : std::array{Target::kWorldX, Target::kWorldY})
@@ -358,6 +363,7 @@ std::string find_change_points(const Fitter& fitter, FitState& state, std::size_
   };
   std::optional<Known> had;  // of the state as it was
   for (Steps& form : forms) {
+    // Nat, on the raster: forms with less are not refined; a smaller value costs a fit for each of them.
     constexpr double kBetter = 2;
     choose_steps(fitter, state, place, points, form);
     if (form.at_s.empty() || form.gain < kBetter) continue;

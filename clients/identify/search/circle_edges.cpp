@@ -28,6 +28,7 @@ bool is_curve_that_moves(const Term& term) {
 
 /// The distance at which one step explains most of the curve of a term's first block, where robots were; mm.
 double edge_of_curve(const FitState& state, const Term& term) {
+  // Samples that judge the edge, at most about; more cost time, fewer place it less exactly.
   constexpr std::size_t kEnough = 4000;
   std::size_t samples = 0;
   for (const TrackView& view : state.tracks.views()) samples += view.track->samples.size();
@@ -111,6 +112,7 @@ double cost_of(const Term& term) {
 }  // namespace
 
 void settle(const Fitter& fitter, FitState& state) {
+  // Fits of two passes; the loop ends earlier once the log likelihood rises by less than 1.
   constexpr int kMostFits = 6;
   double before = -1e300;
   for (int i = 0; i < kMostFits; ++i) {
@@ -123,6 +125,7 @@ void settle(const Fitter& fitter, FitState& state) {
 
 void climb(const Fitter& fitter, FitState& state, std::size_t place, double first_mm,
            const std::vector<MoveNumber>& moves, std::uint64_t most_work) {
+  // Smallest move; a smaller one costs a fit per number and places edges below the tracker's noise.
   constexpr double kLast_mm = 0.7;
   double likelihood = fitter.log_likelihood(state);
   const auto moved = [&](const MoveNumber& move, double by_mm) {
@@ -161,6 +164,7 @@ void put_edges(const Fitter& fitter, FitState& state, std::size_t place, const s
 }
 
 bool sharpen_moving_circles(const Fitter& fitter, Search& found, std::uint64_t most_work) {
+  // First move of a number; a larger one leaves a wrong place farther off, a smaller one needs more fits.
   constexpr double kFirst_mm = 24;
   bool sharpened = false;
   for (std::size_t t = 0; t < found.fit.model.terms.size(); ++t) {

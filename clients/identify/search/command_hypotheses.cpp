@@ -122,7 +122,7 @@ void add_command_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   }
   // Robots at rest may creep.
   if (extent.has_stop) {
-    constexpr std::uint8_t kAtRest = 1;
+    constexpr std::uint8_t kAtRest = 1;  // bit of the command 0, stop
     const auto ahead = make.put(Target::kAhead, {}, kAtRest), aside = make.put(Target::kSideways, {}, kAtRest),
                turning = make.put(Target::kTurn, {}, kAtRest);
     make.add("creep-by-command", {"command"}, "motion at rest", {ahead}, 2);
@@ -155,8 +155,8 @@ void add_command_hypotheses(DictionaryBuilder& make, const Extent& extent) {
 
 void add_history_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   if (!extent.has_turns && !extent.has_stop) return;
-  constexpr std::uint8_t kStraightOnly = 1u << 1;
-  constexpr Eigen::Index kCurve = 4;  // as after a reversal
+  constexpr std::uint8_t kStraightOnly = 1u << 1;  // bit of the command 1, straight
+  constexpr Eigen::Index kCurve = 4;               // as after a reversal
   std::vector<double> before{kNoCommand};
   if (extent.has_turns) before.insert(before.begin(), {2, 3});
   const auto turns = static_cast<Eigen::Index>(before.size()) - 1;

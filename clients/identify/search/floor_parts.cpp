@@ -19,6 +19,7 @@ namespace {
 
 using Shape = Factor::Shape;
 
+/// Discs or half planes in place of a map; more are tried one by one, each at the cost of several fits.
 constexpr std::size_t kMostParts = 3;
 /// A further part explains at least this share of the map's variance. Beside a high step, a slope is a small share and many nats.
 constexpr double kLeastShare = 0.003;
@@ -134,6 +135,7 @@ bool move_parts(const Fitter& fitter, FitState& state, std::size_t place) {
 
 /// Adds a curve over the coordinate of a part to a term, and moves all curves to where they are most likely.
 void add_curve(const Fitter& fitter, FitState& state, std::size_t place, Target target, const MapPart& part) {
+  // Cosines of a part's curve; more follow a sharp edge closer, and chance too.
   constexpr std::uint32_t kColumns = 16;
   Term& term = state.model.terms[place];
   term.blocks.push_back({target, Basis{{curve_over(state, part.axis, kColumns)}}, kDriven});

@@ -53,7 +53,7 @@ Part robot_part(const Extent& e) {
 }
 /// Distance of the nearest robot, up to 150 mm.
 Part nearest_part(std::uint32_t count) {
-  constexpr std::uint8_t kRadius = 11;
+  constexpr std::uint8_t kRadius = 11;  // index in kNeighbourRadii_mm
   Factor f = over(Shape::kTaper, Covariate::kNearest, 0, kNeighbourRadii_mm[kRadius], count);
   f.axis.radius = kRadius;
   return {"neighbours", f};

@@ -8,6 +8,8 @@
 namespace kilotwin::identify {
 namespace {
 
+/// Places at which the map is compared with parts. More cost time in proportion, for each part that is tried; fewer miss
+/// small discs.
 constexpr std::size_t kMostPoints = 4000;
 /// Positions along an axis, and radii as shares of the larger side of the visited area; directions of half a turn.
 constexpr int kCentresAcross = 14, kDirections = 36;
@@ -165,6 +167,7 @@ MapPart best_half_plane(const std::vector<MapPoint>& points, const Extent& e) {
     return true;
   };
   for (int i = 0; i < kDirections; ++i) better(M_PI * i / kDirections);
+  // Shift of the edge at the area's side by the last turn of its direction; a smaller one costs time only.
   constexpr double kLast_mm = 1;
   double step_rad = M_PI / kDirections / 2;
   while (step_rad * side_mm(e) > kLast_mm) {

@@ -73,6 +73,7 @@ double gain_of(const std::vector<SpeedPoint>& points, const ScanTotal& total, co
     information += static_cast<double>(in * p.information);
   }
   const double share = information / std::max(total.information, 1e-9);
+  // Least share of the information in and outside a circle; smaller ones find circles about a few samples.
   constexpr double kLeast = 0.005;
   if (share < kLeast || share > 1 - kLeast) return 0;
   const double contrast = score - total.score * share;
@@ -273,6 +274,7 @@ Dictionary dictionary_of_circles(const FitState& state, const Extent& extent,
   Dictionary dictionary;
   DictionaryBuilder make(dictionary);
   const double raster = static_cast<double>(raster_of(extent).size()), choices = raster * raster;
+  // Cosines of a curve over the distance; more follow a sharp edge closer, and chance too.
   constexpr std::uint32_t kColumns = 16;
   for (const MovingCircle& circle : circles) {
     const auto bases = make.put(kSpeed, Basis{{curve_over(state, about(circle.centre), kColumns)}});

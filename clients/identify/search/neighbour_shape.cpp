@@ -44,6 +44,7 @@ bool is_of_neighbours(const Block& block) {
 /// The 99.9th percentile of the density within each radius.
 std::array<double, kNeighbourRadii_mm.size()> densities(const PreparedSet& set) {
   std::array<std::vector<float>, kNeighbourRadii_mm.size()> all;
+  // Raster of the density; a finer one costs time, a coarser one leaves few values for the percentile.
   constexpr double kEvery_s = 3;
   for (const TrackView& view : set.views()) {
     double t = view.track->samples.front().time_s;
@@ -175,6 +176,8 @@ std::vector<Form> forms_of_push(const PreparedSet& set, bool turns, std::uint8_t
 
 /// The same forms with continuous radii around the present ones, and with wider and narrower directions.
 std::vector<Form> with_reach_about(const std::vector<Form>& forms) {
+  // Reach of the search about a radius, nearly the distance to the next one in kNeighbourRadii_mm, and bounds of a
+  // direction's focus. Wider ones cost a column per form.
   constexpr int kAbout_mm = 9, kLeastFocus = 1, kMostFocus = 12;
   std::vector<Form> out;
   for (const Form& form : forms) {

@@ -7,7 +7,7 @@
 namespace kilotwin::identify {
 namespace {
 
-constexpr std::size_t kLanes = 8;
+constexpr std::size_t kLanes = 8;  // numbers per vector register of the sums; sum_of_lanes adds exactly so many
 /// Points that pass through all frequencies together: few enough for the nearest cache.
 constexpr std::size_t kPointsTogether = 256;
 using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));

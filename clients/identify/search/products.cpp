@@ -264,6 +264,7 @@ Factor shape_of(Factor f, bool rich) {
 
 /// A typical largest absolute value of a function. Of curves: an upper bound.
 double size_of(const Factor& f) {
+  // Share of a grid's nodes above the size; with 0, one node that chance made high would decide.
   constexpr double kTail = 0.02;
   std::vector<double> values;
   if (f.shape == Shape::kGrid) {
@@ -293,6 +294,7 @@ void about_the_mean(Term& term) {
                                                 static_cast<Eigen::Index>(like[i].known.size()));
     const double mean = like[i].plus + each.mean(), most = (like[i].plus + each).abs().maxCoeff();
     if (most == 0) continue;
+    // Share of the largest amplitude; a mean below it is near 0, and would make the table's values huge.
     constexpr double kNextToNone = 0.2;
     const double unit = std::abs(mean) > kNextToNone * most ? mean : most;
     const Eigen::ArrayXd about = (like[i].plus + each - mean) / unit;
@@ -342,6 +344,7 @@ ProductFit::ProductFit(const Fitter& fitter, FitState& state, std::size_t place,
 
 /// All functions known: one column.
 void ProductFit::put_known() {
+  // Weak prior of the amplitude: a standard deviation of 10; a larger value pulls it towards 0.
   constexpr double kPrecision = 0.01;
   term().blocks = {{target_, Basis{functions_}, during_}};
   term().coefficients = Eigen::VectorXd::Ones(1);
@@ -517,7 +520,10 @@ void ProductFit::reopen_grid(std::size_t open) {
 }
 
 void ProductFit::fit() {
+  // Bounds on the rounds over all functions, first in coarse and then in rich shapes, and passes of a fit in a new rich
+  // shape. More cost a fit per function each.
   constexpr int kMostRounds = 8, kMostRichRounds = 3, kPasses = 3;
+  // Nat; a round that gains less ends the loop; a smaller value adds rounds that gain little.
   constexpr double kSettled = 2;
   const std::size_t n = functions_.size(), last = n - 1;
   fitter_.fit(state_, 1);
@@ -590,6 +596,7 @@ RankOne rank_one(const Pair& pair, const ReducedColumns& data, const Term& term)
   Eigen::Index largest = 0;
   matrix.rowwise().squaredNorm().maxCoeff(&largest);
   RankOne out{Eigen::VectorXd::Zero(matrix.rows()), matrix.row(largest).transpose(), 0};
+  // Alternations between the two halves, which are cheap: no filter runs; fewer may end before they agree.
   constexpr int kRounds = 40;
   for (int round = 0; round < kRounds; ++round) {
     if (out.other.norm() == 0) return out;
@@ -643,7 +650,7 @@ std::vector<OneTarget> by_target(const Term& term) {
 
 /// The product acts on a further target, too, with an amplitude of its own: a drift has a direction.
 void add_target(Term& product, const std::vector<Factor>& functions, const Block& like) {
-  constexpr double kPrecision = 0.01;
+  constexpr double kPrecision = 0.01;  // weak prior of the amplitude, as in put_known
   product.blocks.push_back({like.target, Basis{functions}, like.during});
   const Eigen::Index had = product.coefficients.size();
   product.coefficients.conservativeResize(had + 1);
@@ -665,6 +672,8 @@ Term main_part(const Term& term) {
 }
 
 bool separate(const Fitter& fitter, FitState& state, std::size_t place) {
+  // Share of the main target's gain that the product form must keep to be fitted. A larger value gives up sooner; a smaller
+  // one costs fits of forms that fail.
   constexpr double kLeastShare = 0.5;
   const Term& term = state.model.terms[place];
   const std::vector<OneTarget> targets = by_target(term);

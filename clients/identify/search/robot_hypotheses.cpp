@@ -8,7 +8,7 @@ using Shape = Factor::Shape;
 }  // namespace
 
 void add_robot_hypotheses(DictionaryBuilder& make, const Extent& extent) {
-  constexpr std::size_t kMost = 120;
+  constexpr std::size_t kMost = 120;  // robots; with more, no hypothesis has a column for each of them
   if (extent.robots.size() < 2 || extent.robots.size() > kMost) return;
   std::vector<double> keys(extent.robots.begin(), extent.robots.end());
   const auto n = static_cast<Eigen::Index>(keys.size());
@@ -29,7 +29,7 @@ void add_robot_hypotheses(DictionaryBuilder& make, const Extent& extent) {
 }
 
 void add_run_hypotheses(DictionaryBuilder& make, const Extent& extent) {
-  constexpr std::size_t kMost = 40;
+  constexpr std::size_t kMost = 40;  // runs; with more, no hypothesis has a column for each of them
   if (extent.runs.size() < 2 || extent.runs.size() > kMost) return;
   const Basis which{{keyed(Shape::kTable, Covariate::kRun, {extent.runs.begin(), extent.runs.end()})}};
   const auto n = static_cast<Eigen::Index>(extent.runs.size());

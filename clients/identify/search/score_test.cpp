@@ -14,6 +14,8 @@
 namespace kilotwin::identify {
 namespace {
 
+/// Folds of the held-out check, over units and over stretches of time. More leave more data in each fit, and cost time;
+/// fewer lower the power.
 constexpr std::size_t kFolds = 6;
 
 /// Columns or rows of a matrix that one task computes. A constant, so that no result depends on the number of threads.
@@ -34,6 +36,7 @@ bool of_robots(const Hypothesis& h) {
 /// Sum of squared cluster scores about the mean of each unit. An effect of one robot makes its clusters alike;
 /// that is signal, not noise. 0 if the units have too few clusters.
 double within_units(const Eigen::MatrixXd& scores, const std::vector<std::size_t>& unit) {
+  // Degrees of freedom; with fewer, the sum about the means is too uncertain to be used.
   constexpr double kFewest = 30;
   double sum = 0, freedom = 0;
   for (std::size_t first = 0; first < unit.size();) {
@@ -66,6 +69,7 @@ bool looks_at_runs(const Term& term) {
                      [](const Block& block) { return block.basis.looks_at(Covariate::kRun); });
 }
 
+/// Random signs that a threshold comes from. More make it less uncertain, and cost a matrix column each.
 constexpr Eigen::Index kFlips = 400;
 /// The fewest degrees of freedom of a statistic that a few clusters dominate.
 constexpr double kFewestDegrees = 0.5;

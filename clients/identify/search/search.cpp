@@ -131,6 +131,7 @@ void SearchLoop::refit_lag() {
 }
 
 bool SearchLoop::became_punctual() {
+  // Passes without the lag, since all parameters have followed it; fewer judge it before the fit has settled.
   constexpr int kPasses = 4;
   const Search before = out_;
   const double evidence = fitter_.log_evidence(out_.fit);
@@ -157,6 +158,8 @@ void SearchLoop::say(WorkKind kind, std::string activity) const {
 }
 
 bool SearchLoop::lag_explains(const Finding& best) {
+  // Share of the best hypothesis's evidence that a lag must gain to be taken in its place. A larger value leaves a wrong
+  // clock to effects; a smaller one takes effects for a clock.
   constexpr double kMost = 0.8;
   if (fitter_.fit_command_lag(out_.fit, kMost * best.evidence) == 0) return false;
   if (out_.reasons.empty() || starts_anew_) return true;
@@ -223,6 +226,8 @@ void SearchLoop::add(const Finding& found, double threshold) {
 }
 
 bool SearchLoop::recovered_by_refinement(std::size_t place, double expected_gain) {
+  // Share of the expected gain that a refined shape must reach, so that no new term is needed. A smaller value merges
+  // effects that are two; a larger one adds terms that a shape could have shown.
   constexpr double kMost = 0.5;
   const Search before = out_;
   const double likelihood = fitter_.log_likelihood(out_.fit);

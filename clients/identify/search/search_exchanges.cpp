@@ -171,6 +171,8 @@ void SearchLoop::try_camera_motion() {
     best = &h;
     best_finding = finding;
   }
+  // Share of the drift's evidence from which a camera that moves is tried in its place. A larger value leaves camera motion
+  // as a drift; a smaller one costs fits.
   constexpr double kAlike = 0.8;
   if (best == nullptr || (!at_rest && best_finding.evidence <
                                           kAlike * score_test_->evidence_of_term(static_cast<int>(place)).evidence))
@@ -189,6 +191,8 @@ bool SearchLoop::is_constant_of(const Term& term, const Term& other) {
 
 void SearchLoop::eliminate_earlier() {
   if (multiplies_term(out_.fit.model, out_.fit.model.terms.back())) return;
+  // Share of an earlier effect's evidence below which the last effect cannot have replaced it. A larger value spares fits,
+  // and leaves effects that the last one made superfluous.
   constexpr double kFarLess = 0.1;
   for (std::size_t t = out_.fit.model.terms.size() - 1; t-- > 0;) {
     const Term &earlier = out_.fit.model.terms[t], &last = out_.fit.model.terms.back();

@@ -96,6 +96,8 @@ bool SearchLoop::fits(GeneralTerm one, const Attempt& attempt) {
 }
 
 bool SearchLoop::accept_wave(double evidence) {
+  // Waves below both bounds, in time and over the area, are left out. Smaller values take slow changes of a smooth map for
+  // waves.
   constexpr double kFewestPeriods = 1.5, kFewestStripes = 4;
   const Attempt attempt{Attempt::Kind::kWave, {}};
   if (failed_.contains(attempt)) return false;

@@ -43,6 +43,7 @@ class SearchLoop {
   [[nodiscard]] Search run();
 
  private:
+  /// Seed of the random signs of the test, with the round added. Another one changes p values within their chance.
   static constexpr std::uint64_t kSeed = 20180729;
   /// Effects with log evidence closer than this (a Bayes factor of 20) count as ambiguous.
   static constexpr double kClose = 3;

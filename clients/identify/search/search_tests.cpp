@@ -64,11 +64,14 @@ bool SearchLoop::good(const Finding& f, double threshold) {
 }
 
 bool SearchLoop::clear(const Finding& f, double threshold) {
+  // Bounds of a finding that is clear: nat, orders of magnitude below the threshold, and held-out gain; those of a good one
+  // are 3, 0 and 2. Larger ones leave fewer findings clear.
   constexpr double kClearEvidence = 5, kClearLog10P = 2, kClearHeldOut = 3;
   return f.log10_p < threshold - kClearLog10P && f.evidence > kClearEvidence && f.held_out > kClearHeldOut;
 }
 
 bool SearchLoop::leaves_hypothesis() {
+  // Share of all gain: hypotheses with less do not count as left; a smaller value counts remnants.
   constexpr double kFair = 0.02;
   score_dictionary();
   const ScoreTest::Outcome outcome =

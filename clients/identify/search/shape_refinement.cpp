@@ -113,7 +113,7 @@ Basis with_chosen_keys(Basis basis) {
 /// Limits the number of cosines in products.
 void shorten(Basis& basis) {
   if (basis.only_open() != nullptr || basis.factors.size() < 2) return;
-  constexpr std::uint32_t kOfARobot = 6;
+  constexpr std::uint32_t kOfARobot = 6;  // cosines per robot; more follow the chance of one robot's track
   const bool of_robots = basis.looks_at(Covariate::kRobot);
   for (Factor& factor : basis.factors) {
     if (factor.shape != Shape::kCosines || !factor.known.empty()) continue;

@@ -14,6 +14,8 @@ namespace {
 
 using Shape = Factor::Shape;
 
+/// Exponentials with different lengths, steps at different points and single harmonics that are tried in place of a curve.
+/// More cost a column each and raise the price of the choice; a finer raster follows about the best one.
 constexpr int kScales = 12, kSteps = 30, kHarmonics = 3;
 /// Largest loss of log evidence of a simple form.
 constexpr double kMostEvidenceLost = 1;
@@ -212,6 +214,8 @@ ChosenInstants choose_instants(const ReducedColumns& data, const std::vector<Swi
 /// instant are left out. Nothing if none has one.
 std::optional<FitState> with_switches(const Fitter& fitter, FitState state, std::size_t place, const Factor& curve,
                                       std::vector<SwitchGroup> groups) {
+  // Instants of the first raster and of the finer ones. More cost a column per key each; too few in the first one miss the
+  // instant.
   constexpr std::size_t kFirst = 12, kNext = 6;
   const Block like = state.model.terms[place].blocks.front();
   for (std::size_t points = kFirst; groups.front().high_s - groups.front().low_s > 1; points = kNext) {
@@ -273,6 +277,7 @@ bool simplify_to_switch(const Fitter& fitter, FitState& state, std::size_t place
   bool replaced = false;
   const FitState curves = state;
   for (const std::vector<SwitchGroup>& groups : {together, each}) {
+    // Groups with an instant of their own; with more, all begin together or keep their curves.
     constexpr std::size_t kMostGroups = 24;
     if (groups.size() > kMostGroups) continue;
     std::optional<FitState> trial = with_switches(fitter, curves, place, curve, groups);

@@ -16,6 +16,7 @@ Axis neighbours_axis(Covariate of, std::uint8_t radius, Others others) {
 
 /// Neighbours that drive, or those at rest.
 void add_by_command(DictionaryBuilder& make) {
+  // Forms to choose from, as the price in log evidence; a larger value finds such effects later.
   constexpr double kChoices = 12;
   for (const Others others : {Others::kDriven, Others::kResting}) {
     for (const std::uint8_t r : kSoughtRadii) {
@@ -38,10 +39,10 @@ void add_by_command(DictionaryBuilder& make) {
 
 /// One robot within a radius of the others: a leader, or a robot with another coating. Or each robot by itself.
 void add_by_robot(DictionaryBuilder& make, const Extent& extent) {
-  constexpr std::size_t kMost = 40;
+  constexpr std::size_t kMost = 40;  // robots; with more, no robot gets a column of its own
   const std::size_t robots = extent.robots.size();
   if (robots < 3 || robots > kMost) return;
-  constexpr std::array<std::uint8_t, 2> kRadii = {6, 11};
+  constexpr std::array<std::uint8_t, 2> kRadii = {6, 11};  // indices in kNeighbourRadii_mm: 100 and 150 mm
   for (const std::uint8_t r : kRadii) {
     std::vector<Eigen::Index> all;
     for (const std::uint32_t robot : extent.robots) {

@@ -103,7 +103,7 @@ std::vector<Extension> extensions_of(const Term& term, bool headings) {
     return all;
   }
   if (is_world(first.target)) {
-    constexpr std::uint8_t kAtRest = 1;
+    constexpr std::uint8_t kAtRest = 1;  // bit of the command 0, stop
     if (!acts(term, first.target, kAtRest))
       all.push_back({{{Target::kWorldX, basis, kAtRest}, {Target::kWorldY, basis, kAtRest}}});
     return all;

@@ -16,6 +16,7 @@ namespace {
 
 using Shape = Factor::Shape;
 
+/// Folds of the cross-validation. More leave more data in each fit, and cost a fit per penalty each.
 constexpr std::size_t kMapFolds = 4;
 /// Least cross-validated gain in log likelihood.
 constexpr double kLeastMapEvidence = 15;
@@ -30,7 +31,7 @@ constexpr double kPowerOfSteps = 0.3;
 
 /// Size of a usual effect on the target over that of a gain: maps are fitted in this unit, so that one penalty serves all targets.
 double unit_of(Target target) {
-  constexpr double kTurn_rad_s = 0.25;
+  constexpr double kTurn_rad_s = 0.25;  // usual effect on turning; a larger value penalises its maps less
   return target == Target::kTurn ? kTurn_rad_s : 1;
 }
 
@@ -169,8 +170,9 @@ NodeGrid grid_of(const PreparedSet& set) {
   };
   bounds(xs, x_low, x_high);
   bounds(ys, y_low, y_high);
+  // Samples per node, at least, and least pitch. Smaller ones make a finer raster, which costs time and follows chance.
   constexpr double kPerNode = 4, kFinest_mm = 10;
-  constexpr int kMostNodes = 95;
+  constexpr int kMostNodes = 95;  // nodes along the longer side; more cost time by the square
   const double width = x_high - x_low, height = y_high - y_low;
   NodeGrid g;
   g.pitch_mm = std::max({kFinest_mm, std::sqrt(width * height * kPerNode / static_cast<double>(xs.size())),
@@ -335,7 +337,10 @@ void fit_total_variation_map(const Fitter& fitter, FitState& state, std::size_t 
   FitState trial = state;
   trial.model.terms[place] = with_map(state.model.terms[place], map.block());
   double likelihood = fitter.log_likelihood(state);
+  // Rounds, of which the last may halve the raster; each costs a fit of the map per fold.
   constexpr int kPasses = 3;
+  // Nodes along the longer side from which on the raster is not halved in the last pass; a larger value makes finer and
+  // slower maps.
   constexpr int kMostNodes = 190;
   for (int pass = 0; pass < kPasses; ++pass) {
     const bool finer = pass == 2 && std::max(map.grid.columns, map.grid.rows) * 2 - 1 < kMostNodes;

@@ -14,6 +14,7 @@ namespace {
 /// Classes of driven time per cell, with increasing width, or of the freshness of a trail.
 class Classes {
  public:
+  /// Classes, each with a speed of its own; more follow the effect closer, and chance too.
   static constexpr std::size_t kCount = 16;
   explicit Classes(bool trail)
       : per_value_(trail ? 1.0F * (kOf - 1) : static_cast<float>(1 / RunNeighbours::kRaster_s)) {
@@ -30,6 +31,7 @@ class Classes {
   }
 
  private:
+  /// Entries of the table: times of kRaster_s each, of which longer ones count as the last, or freshness from 0 to 1.
   static constexpr std::size_t kOf = 512;
   float per_value_;
   std::array<std::uint8_t, kOf> of_;
@@ -128,6 +130,7 @@ GridCells fit_grid_cells(const Fitter& fitter, const FitState& state, const Grid
                   [&](std::size_t i) { all[i].value = explained(visits, all[i].cells); });
   std::stable_sort(all.begin(), all.end(),
                    [](const RatedCells& a, const RatedCells& b) { return a.value > b.value; });
+  // Cells that are refined, the best of the raster; more cost a climb each and miss the optimum less often.
   constexpr std::size_t kClimbed = 6;
   all.resize(std::min(all.size(), kClimbed));
   os::in_parallel(all.size(), fitter.threads(),

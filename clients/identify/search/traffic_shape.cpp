@@ -49,6 +49,7 @@ void evaluate(const ReducedColumns& data, const std::vector<Eigen::Index>& colum
 
 /// Forward selection of steps while the gain exceeds the choice penalty.
 Form some_steps(const ReducedColumns& data, Eigen::Index first, const Block& steps) {
+  // Steps of the curve over traffic; more imitate a smooth curve by many steps.
   constexpr std::size_t kMostSteps = 5;
   const std::vector<double>& points = steps.basis.factors.front().points;
   const double price = std::log(static_cast<double>(points.size()));

@@ -250,6 +250,7 @@ Dictionary wave_dictionary_of(const Fitter& fitter, const FitState& state, const
   DictionaryBuilder make(dictionary);
   const std::vector<Point> points = points_of(fitter, state);
   const double width_mm = extent.x_high_mm - extent.x_low_mm, height_mm = extent.y_high_mm - extent.y_low_mm;
+  // Points; with fewer, no wave is sought; a smaller value finds more waves that are chance.
   constexpr std::size_t kFewest = 500;
   if (points.size() >= kFewest && extent.duration_s > 2 * kShortest_s) {
     const Raster raster = raster_of(width_mm, height_mm, extent.duration_s, points.size());

@@ -24,6 +24,8 @@ Visits visits_of(const Fitter& fitter, const FitState& state, std::uint8_t durin
     sums.remove_mean();
     residuals[v] = std::move(sums.all);
   });
+  // Robots times instants, at most about: beyond, instants are left out. More cost time for each grid of cells that is
+  // tried.
   constexpr std::size_t kMost = 150000;
   const auto tracks_of = [&](std::size_t r) { return set.set().runs[r].tracks.size(); };
   std::vector<std::vector<Instant>> runs(set.set().runs.size());

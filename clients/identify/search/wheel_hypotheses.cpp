@@ -4,7 +4,7 @@ namespace kilotwin::identify {
 
 void add_wheel_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   using Shape = Factor::Shape;
-  constexpr double kWheels = 2;
+  constexpr double kWheels = 2;  // choices, for the price of each hypothesis: the left or the right wheel
   const auto each = [&](const char* of, const char* word, const Factor& factor,
                         std::initializer_list<Eigen::Index> sizes) {
     for (const Target wheel : {Target::kGainLeft, Target::kGainRight}) {

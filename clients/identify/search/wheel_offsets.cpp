@@ -22,6 +22,7 @@ constexpr std::uint8_t bit_of_motion(Motion motion) {
 struct WheelCommands {
   std::uint8_t of_left, of_right;
 };
+/// Commands under which each wheel is driven alone or with the other one: a right turn drives the left wheel.
 constexpr std::uint8_t kLeftMoves = bit_of_motion(Motion::kStraight) | bit_of_motion(Motion::kRight),
                        kRightMoves = bit_of_motion(Motion::kStraight) | bit_of_motion(Motion::kLeft);
 constexpr std::array<WheelCommands, 2> kWheelForms = {WheelCommands{kDriven, kDriven},

@@ -33,6 +33,8 @@ double cost_of(int kind, double terms) {
 
 /// Changes of the model after a unit, as expected: their mean over the scenes of tests/identify.
 double likely_changes(WorkKind now, double terms) {
+  // Changes after the base model, after a search with terms, and once the search is over. Wrong values spoil the estimate
+  // of the remaining time, but no result.
   constexpr double kOfBaseModel = 1.2, kOfExtended = 0.4, kNothingPassed = 0.1;
   if (now >= kAlternatives) return kNothingPassed;
   return terms == 0 ? kOfBaseModel : kOfExtended;

@@ -7,6 +7,8 @@
 namespace kilotwin::identify {
 namespace {
 
+/// Bins of a covariate alone and of each of two, and robots that may have a bin each. More show finer patterns, from fewer
+/// windows each.
 constexpr std::size_t kBins = 12, kBinsOfPairs = 8, kMostRobots = 64;
 /// Windows that pull a mean to 0: means of few windows predict less than they show.
 constexpr double kShrink = 4;

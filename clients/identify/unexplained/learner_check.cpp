@@ -101,6 +101,7 @@ std::optional<LearnerCheck> learner_check(const MeasuredSet& set, const std::vec
       stretch.rows += 1;
     }
   };
+  // Folds of the cross-validation; more leave more windows to learn from, and cost a forest each.
   constexpr std::size_t kFolds = 4;
   if (!cross_validated) judge(known, held_out);
   for (std::size_t fold = 0; cross_validated && fold < kFolds; ++fold) {

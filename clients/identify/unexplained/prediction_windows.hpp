@@ -27,6 +27,7 @@ enum class Feature : std::uint8_t {
   kRobot          ///< robot number
 };
 inline constexpr std::size_t kFeatures = 12;
+/// Distance from which on a neighbour counts as none; a larger value counts more of them.
 inline constexpr double kFarNeighbour_mm = 200;
 
 /// Name as in result.json, unit, and name for people.

@@ -125,8 +125,8 @@ std::string variation_in_words(const std::vector<Pattern>& patterns) {
 
 /// A robot whose error is several times that of the others, in one sentence; empty: none.
 std::string odd_robot_in_words(const MeasuredSet& set, const PredictionErrors& errors) {
-  constexpr double kOdd = 3;
-  constexpr std::size_t kFewestRobots = 4;
+  constexpr double kOdd = 3;  // multiple of the robots' median; a smaller one names robots that differ by chance
+  constexpr std::size_t kFewestRobots = 4;  // robots; with fewer, the median says little, and no robot is named
   std::map<std::uint32_t, PredictionErrors::Part> robots;
   for (const auto& [at, part] : errors.by_track) {
     PredictionErrors::Part& sum = robots[set.runs[at.first].tracks[at.second].robot];
