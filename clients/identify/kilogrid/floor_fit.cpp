@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <span>
 
 #include "clients/identify/kilogrid/floor_evidence.hpp"
 
@@ -236,6 +237,36 @@ double fit(FloorModel& model, const FloorTarget& target, int rounds, double widt
   return misfit;
 }
 
+namespace {
+
+/// Changes of the statistics without each robot of the measured runs: a column per robot.
+Eigen::MatrixXd without_each_robot(const FloorSet& set) {
+  std::vector<RobotSums> robots;
+  for (const std::vector<RobotSums>& run : set.runs) robots.insert(robots.end(), run.begin(), run.end());
+  Eigen::MatrixXd out =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(statistic_count()), static_cast<Eigen::Index>(robots.size()));
+  for (std::size_t r = 0; r < robots.size(); ++r) {
+    std::swap(robots[r], robots.back());
+    const FloorStatistics less = statistics_of(std::span(robots).first(robots.size() - 1));
+    std::swap(robots[r], robots.back());
+    for (Eigen::Index q = 0; q < out.rows(); ++q) {
+      const double change =
+          less.value[static_cast<std::size_t>(q)] - set.statistics.value[static_cast<std::size_t>(q)];
+      if (std::isfinite(change)) out(q, static_cast<Eigen::Index>(r)) = change;
+    }
+  }
+  return out;
+}
+
+/// Variances of linear estimates by the jackknife: a column of changes per robot that is left out.
+Eigen::VectorXd jackknife(const Eigen::MatrixXd& changes) {
+  const auto robots = static_cast<double>(changes.cols());
+  const Eigen::MatrixXd off = changes.colwise() - changes.rowwise().mean();
+  return (robots - 1) / robots * off.rowwise().squaredNorm();
+}
+
+}  // namespace
+
 std::vector<double> standard_errors(const FloorModel& model, const FloorTarget& target, std::uint64_t seed) {
   constexpr double kWidth = 0.5;  // of the last rounds of the fit
   const Metric metric(target, quick_set(target, model, seed));
@@ -255,11 +286,16 @@ std::vector<double> standard_errors(const FloorModel& model, const FloorTarget& 
       bread.eigenvalues().unaryExpr([&](double v) { return v > least ? 1 / v : 1 / least; });
   const Eigen::MatrixXd half =
       bread.eigenvectors() * inverse.asDiagonal() * bread.eigenvectors().transpose() * weighted.transpose();
+  // Statistics of the same robots depend on each other. So robots are left out in turn; the fit's own simulations are such robots, too.
+  const Eigen::VectorXd of_robots =
+      (1 + 1.0 / kQuickRuns) * jackknife(half * metric.slopes(at, without_each_robot(target.set())));
   const std::vector<FloorParameter> parameters = model.parameters();
   std::vector<double> out;
   out.reserve(parameters.size());
   for (std::size_t p = 0; p < parameters.size(); ++p) {
-    const double sd = half.row(static_cast<Eigen::Index>(p)).norm() * kWidth * parameters[p].width;
+    const auto row = static_cast<Eigen::Index>(p);
+    const double variance = std::max(half.row(row).squaredNorm(), of_robots(row)),
+                 sd = std::sqrt(variance) * kWidth * parameters[p].width;
     const bool seen = slopes.col(static_cast<Eigen::Index>(p)).squaredNorm() > 0;
     out.push_back(seen && std::isfinite(sd) ? sd : std::numeric_limits<double>::infinity());
   }

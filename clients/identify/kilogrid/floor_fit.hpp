@@ -17,8 +17,10 @@ using FloorProgress = std::function<void(const std::string&)>;
 double fit(FloorModel&, const FloorTarget&, int rounds, double width, std::uint64_t seed, const FloorProgress&);
 
 /// Standard errors of all parameters of a fitted model, by the linearised method of moments (Gourieroux, Monfort and Renault, Indirect
-/// inference, 1993): the variances of the statistics between robots and runs, carried through the slopes of the statistics. As if the
-/// statistics were independent in the metric of the fit. Infinite where no statistic depends on the parameter.
+/// inference, 1993): the variances of the statistics between robots and runs, carried through the slopes of the statistics. The larger
+/// counts of two. One takes the statistics as independent in the metric of the fit; the other is a jackknife over robots, since
+/// statistics of the same robots depend on each other. Neither has the noise of simulations by which a fit ends early. Infinite where no
+/// statistic depends on the parameter.
 [[nodiscard]] std::vector<double> standard_errors(const FloorModel&, const FloorTarget&, std::uint64_t seed);
 
 /// Initial fit for a start far from the optimum: wide steps with short fast runs.

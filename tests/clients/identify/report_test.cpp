@@ -91,9 +91,9 @@ TEST(Report, ShowsTheDocument) {
   const std::string page = page_of(full_document());
   EXPECT_TRUE(parses(page));
   for (const char* said :
-       {"depends on time", "the measurement", "16.3 mm", "3.52 mm", "3.38 mm", "Wheels run slower the later it is.",
-        "10⁻²⁰⁰", "Robots 3 and 9 carry each other", "Let some rest.", "grain", "id=\"maps\"", "id=\"simulated\"",
-        "wheel base, mm", "83 %"}) {
+       {"depends on <em>time</em>", "the measurement", "16.3 mm", "3.52 mm", "3.38 mm",
+        "Wheels run slower the later it is.", "10⁻²⁰⁰", "Robots 3 and 9 carry each other", "Let some rest.",
+        "grain", "id=\"maps\"", "id=\"simulated\"", "wheel base, mm", "83 %"}) {
     EXPECT_NE(page.find(said), std::string::npos) << said;
   }
   // Plots: one card, horizon, steps, robots, two maps and two arrow maps, one covariate, one distribution, MSD.
