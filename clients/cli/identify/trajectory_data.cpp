@@ -67,8 +67,11 @@ identify::MeasuredSet read(const DataPlaces& places, const fs::path& directory, 
 
 std::unique_ptr<identify::Study> read_tracks(const DataPlaces& given, const identify::Options& options) {
   DataPlaces places = given;
-  places.train = tracked(places.train, places.out / "tracked-train", options);
-  places.test = tracked(places.test, places.out / "tracked-test", options);
+  // Tables whose format is stated count, not films beside them.
+  if (!places.format) {
+    places.train = tracked(places.train, places.out / "tracked-train", options);
+    places.test = tracked(places.test, places.out / "tracked-test", options);
+  }
   const bool has_test = !places.test.empty();
   // A track without a number must not look like a robot of the test set.
   const std::uint32_t first_number =

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <opencv2/videoio.hpp>
@@ -75,6 +76,23 @@ TEST(IdentifyFilms, AFilmThatCannotBeReadIsNamed) {
   EXPECT_EQ(outcome.status, 1);
   EXPECT_NE(outcome.err.find("broken.mp4: cannot be tracked: "), std::string::npos) << outcome.err;
   EXPECT_FALSE(std::filesystem::exists(scratch / "found")) << "an unfinished result is removed";
+}
+
+TEST(IdentifyFilms, TablesOfAStatedFormatCountBesideFilms) {
+  const Scratch scratch;
+  std::filesystem::create_directories(scratch / "data");
+  write(scratch / "data/broken.mp4", "no film");
+  std::string rows = "id,t,px,py\n";
+  for (int robot = 0; robot < kRobots; ++robot)
+    for (int k = 0; k < 80; ++k)
+      rows += fmt::format("{},{},{},{}\n", robot, 0.5 * k, kSpeed_mm_s * 0.5 * k + 3 * std::sin(k), 90 * robot);
+  write(scratch / "data/monday.csv", rows);
+  const Outcome outcome = Process({KILOTWIN_IDENTIFY, "identify", "--train", scratch / "data", "--out",
+                                   scratch / "found", "--quiet", "--columns", "time=t,robot=id,x=px,y=py"},
+                                  scratch.path())
+                              .wait(200);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(identify::load_measured_set(scratch / "found/imported-train").runs.at(0).name, "monday");
 }
 
 }  // namespace
