@@ -1,9 +1,6 @@
 #include "clients/identify/search/products.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/SVD>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numeric>
 #include <utility>
@@ -11,6 +8,7 @@
 #include "clients/identify/search/change_points.hpp"
 #include "clients/identify/search/dictionary_builder.hpp"
 #include "clients/identify/search/local_quadratic.hpp"
+#include "clients/identify/search/product_functions.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
 #include "clients/identify/search/total_variation_map.hpp"
 #include "core/stats/quantiles.hpp"
@@ -20,207 +18,8 @@ namespace {
 
 using Shape = Factor::Shape;
 
-/// Nodes along each axis of a smooth map as known values: five per half-wave of its finest column.
-constexpr std::uint32_t kNodes = 97;
 /// A step this long before all data is a constant, s.
 constexpr double kAlways_s = 1e6;
-
-bool is_of_place(const Factor& f) { return f.axis.of == Covariate::kX || f.axis.of == Covariate::kY; }
-
-/// A block's open factor with its share of the coefficients; null: a constant.
-struct Summand {
-  const Factor* open;
-  Basis basis;
-  Eigen::VectorXd coefficients;
-
-  [[nodiscard]] double at(const Situation& s) const {
-    std::array<double, kMostColumns> values;
-    basis.evaluate(s, 0, values.data());
-    return coefficients.dot(Eigen::Map<const Eigen::VectorXd>(values.data(), coefficients.size()));
-  }
-};
-
-/// The parts of a term that act on its first target, without the known factors that they share; empty: they do not share them.
-std::vector<Summand> summands_of(const Term& term) {
-  std::vector<Summand> all;
-  const Block& first = term.blocks.front();
-  const auto count_known = [](const Basis& basis) {
-    return std::count_if(basis.factors.begin(), basis.factors.end(),
-                         [](const Factor& f) { return !f.known.empty(); });
-  };
-  Eigen::Index next = 0;
-  for (const Block& block : term.blocks) {
-    const auto n = static_cast<Eigen::Index>(block.basis.size());
-    const Eigen::Index from = std::exchange(next, next + n);
-    if (block.target != first.target || block.during != first.during) continue;
-    const auto known = count_known(block.basis),
-               open = static_cast<std::ptrdiff_t>(block.basis.factors.size()) - known;
-    if (known != count_known(first.basis) || open > 1) return {};
-    Summand one{block.basis.only_open(), {}, term.coefficients.segment(from, n)};
-    if (one.open != nullptr) one.basis = {{*one.open}, block.basis.chosen};
-    all.push_back(std::move(one));
-  }
-  return all;
-}
-
-/// Values of a map at nodes; nothing if the summands do not share a plane.
-std::optional<Factor> sampled(const std::vector<Summand>& summands, Target target) {
-  Factor grid;
-  grid.shape = Shape::kGrid;
-  grid.axis.of = Covariate::kX;
-  grid.and_axis.of = Covariate::kY;
-  std::uint32_t rows = kNodes;
-  grid.count = kNodes;
-  const auto reach = [&](Covariate of, double low, double high) {
-    (of == Covariate::kX ? grid.low : grid.and_low) = low;
-    (of == Covariate::kX ? grid.high : grid.and_high) = high;
-  };
-  bool of_x = false, of_y = false;
-  for (const Summand& one : summands) {
-    if (one.open == nullptr) continue;
-    const Factor& f = *one.open;
-    if (!is_of_place(f) || (f.of_two() && f.and_axis.of != Covariate::kY)) return std::nullopt;
-    reach(f.axis.of, f.low, f.high);
-    if (f.of_two()) reach(f.and_axis.of, f.and_low, f.and_high);
-    of_x = of_x || f.axis.of == Covariate::kX;
-    of_y = of_y || f.axis.of == Covariate::kY || f.of_two();
-    if (f.shape != Shape::kGrid) continue;
-    grid.count = f.count;
-    rows = static_cast<std::uint32_t>(f.points.size()) / f.count;
-  }
-  if (!of_x || !of_y) return std::nullopt;
-  Situation s;
-  for (std::uint32_t j = 0; j < rows; ++j) {
-    for (std::uint32_t i = 0; i < grid.count; ++i) {
-      s.x_mm = grid.low + (grid.high - grid.low) * i / (grid.count - 1);
-      s.y_mm = grid.and_low + (grid.and_high - grid.and_low) * j / (rows - 1);
-      double sum = 0, gain = 1;
-      for (const Summand& one : summands) {
-        const double own = one.at(s);
-        sum += own;
-        gain *= 1 + own;
-      }
-      // Gains of blocks multiply, all else adds up.
-      grid.points.push_back(is_gain(target) ? gain - 1 : sum);
-    }
-  }
-  grid.known = {1};
-  return grid;
-}
-
-/// The sum of the open parts of a term as one factor with known coefficients.
-std::optional<Factor> function_of(const Term& term) {
-  const std::vector<Summand> summands = summands_of(term);
-  const Summand* open = nullptr;
-  std::size_t count = 0;
-  double constant = 0;
-  for (const Summand& one : summands) {
-    if (one.open == nullptr) {
-      constant += one.coefficients[0];
-    } else {
-      open = &one;
-      ++count;
-    }
-  }
-  if (count == 0) return std::nullopt;
-  if (count > 1 || open->open->of_two()) return sampled(summands, term.blocks.front().target);
-  Factor function = *open->open;
-  function.known.assign(function.columns(), 0);
-  for (std::size_t i = 0; i < open->basis.size(); ++i)
-    function.known[open->basis.chosen.empty() ? i : open->basis.chosen[i]] =
-        open->coefficients[static_cast<Eigen::Index>(i)];
-  function.plus = constant;
-  // Columns that are constant.
-  if (function.shape == Shape::kHarmonics && function.first == 0 && function.count > 1) {
-    function.plus += function.known[0];
-    function.known.erase(function.known.begin(), function.known.begin() + 2);
-    ++function.first;
-    --function.count;
-  }
-  if (function.shape == Shape::kAtLeast && function.points.size() > 1 && function.points.front() < 0) {
-    function.plus += function.known[0];
-    function.known.erase(function.known.begin());
-    function.points.erase(function.points.begin());
-  }
-  return function;
-}
-
-/// A step in time times a table, both open (simplify_to_switch), as known factors.
-std::vector<Factor> functions_of_switch(const Term& term) {
-  const Basis& basis = term.blocks.front().basis;
-  if (term.blocks.size() != 1 || basis.factors.size() < 2) return {};
-  const std::size_t at = basis.factors.size() - 2;
-  const Factor &step = basis.factors[at], &table = basis.factors[at + 1];
-  if (step.shape != Shape::kAtLeast || step.points.size() != 1 || table.shape != Shape::kTable ||
-      !step.known.empty() || !table.known.empty())
-    return {};
-  std::vector<Factor> functions = basis.factors;
-  functions[at].known = {1};
-  functions[at + 1].known.assign(table.columns(), 0);
-  for (std::size_t i = 0; i < basis.size(); ++i)
-    functions[at + 1].known[basis.chosen.empty() ? i : basis.chosen[i]] =
-        term.coefficients[static_cast<Eigen::Index>(i)];
-  return functions;
-}
-
-/// The coefficients of a term as a matrix over the columns of its two open factors.
-struct Pair {
-  Factor one, other;
-  std::vector<std::pair<Eigen::Index, Eigen::Index>> at;  ///< row and column of each coefficient
-};
-
-/// The blocks of a term that act on one target: two open factors each, of which the first continues the cosines of the block before.
-/// Nothing: another term.
-std::optional<Pair> pair_of(const Term& term) {
-  Pair pair;
-  Eigen::Index rows = 0;
-  for (const Block& block : term.blocks) {
-    const std::vector<Factor>& f = block.basis.factors;
-    if (f.size() != 2 || !f[0].known.empty() || !f[1].known.empty() || block.target != term.blocks.front().target ||
-        block.during != term.blocks.front().during)
-      return std::nullopt;
-    if (rows == 0) {
-      pair.one = f[0];
-      pair.other = f[1];
-    } else {
-      const bool continues = pair.one.shape == Shape::kCosines && f[0].shape == Shape::kCosines &&
-                             pair.one.axis == f[0].axis && f[0].first == pair.one.first + pair.one.count &&
-                             f[1].shape == pair.other.shape && f[1].count == pair.other.count;
-      if (!continues) return std::nullopt;
-      pair.one.count += f[0].count;
-    }
-    const auto across = static_cast<Eigen::Index>(f[1].size());
-    for (std::size_t i = 0; i < block.basis.size(); ++i) {
-      const auto column = static_cast<Eigen::Index>(block.basis.chosen.empty() ? i : block.basis.chosen[i]);
-      pair.at.emplace_back(rows + column / across, column % across);
-    }
-    rows += static_cast<Eigen::Index>(f[0].size());
-  }
-  if (pair.one.size() < 2 || pair.other.size() < 2) return std::nullopt;
-  return pair;
-}
-
-/// The functions of a term over two open factors whose coefficients are nearly a product, as the time after one kind of command is.
-std::vector<Factor> functions_of_pair(const Term& term) {
-  constexpr double kShare = 0.8;  // of the sum of squares of the coefficients
-  const std::optional<Pair> pair = pair_of(term);
-  if (!pair || pair->one.of_two() || pair->other.of_two()) return {};
-  // Curves over what only rises stand for much else, as for a circle that grows.
-  if (only_rises(pair->one.axis) || only_rises(pair->other.axis)) return {};
-  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(pair->one.columns()),
-                                                 static_cast<Eigen::Index>(pair->other.columns()));
-  for (std::size_t k = 0; k < pair->at.size(); ++k)
-    matrix(pair->at[k].first, pair->at[k].second) = term.coefficients[static_cast<Eigen::Index>(k)];
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(matrix, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  const double largest = svd.singularValues()[0];
-  if (!(largest > 0) || largest * largest < kShare * matrix.squaredNorm()) return {};
-  const Eigen::VectorXd of_one = svd.matrixU().col(0), of_other = largest * svd.matrixV().col(0);
-  std::vector<Factor> functions{pair->one, pair->other};
-  functions[0].known.assign(of_one.begin(), of_one.end());
-  functions[1].known.assign(of_other.begin(), of_other.end());
-  return functions;
-}
-
 /// How rich a function is. The richest stays open.
 int richness(const Factor& f) {
   // A curve along one axis may become a map.
@@ -280,11 +79,6 @@ double size_of(const Factor& f) {
   return *std::max_element(values.begin(), values.end());
 }
 
-void scale(Factor& f, double by) {
-  f.plus *= by;
-  for (double& k : f.known) k *= by;
-}
-
 /// Normalises known tables to a mean of 1, which is the value of an unseen key. If the mean is near 0, the largest becomes 1.
 void about_the_mean(Term& term) {
   const std::vector<Factor> like = term.blocks.front().basis.factors;
@@ -310,24 +104,6 @@ void about_the_mean(Term& term) {
 
 }  // namespace
 
-std::vector<Factor> functions_of(const Term& term) {
-  if (term.general || term.blocks.empty()) return {};
-  if (std::vector<Factor> functions = functions_of_switch(term); !functions.empty()) return functions;
-  std::vector<Factor> functions;
-  std::optional<Factor> open = function_of(term);
-  if (!open) {
-    // A product of known functions, with one coefficient.
-    functions = term.blocks.front().basis.factors;
-    if (term.coefficients.size() != 1 || functions.empty()) return functions_of_pair(term);
-    scale(functions.back(), term.coefficients[0]);
-    return functions;
-  }
-  for (const Factor& f : term.blocks.front().basis.factors)
-    if (!f.known.empty()) functions.push_back(f);
-  functions.push_back(*open);
-  return functions;
-}
-
 ProductFit::ProductFit(const Fitter& fitter, FitState& state, std::size_t place, std::vector<Factor> functions)
     : fitter_(fitter),
       state_(state),
@@ -344,11 +120,9 @@ ProductFit::ProductFit(const Fitter& fitter, FitState& state, std::size_t place,
 
 /// All functions known: one column.
 void ProductFit::put_known() {
-  // Weak prior of the amplitude: a standard deviation of 10; a larger value pulls it towards 0.
-  constexpr double kPrecision = 0.01;
   term().blocks = {{target_, Basis{functions_}, during_}};
   term().coefficients = Eigen::VectorXd::Ones(1);
-  term().precision = Eigen::VectorXd::Constant(1, kPrecision);
+  term().precision = Eigen::VectorXd::Constant(1, kAmplitudePrecision);
 }
 
 void ProductFit::normalise(std::size_t i) {
@@ -561,164 +335,6 @@ void ProductFit::fit() {
   if (steps) put_known();
   if (grid || steps) fitter_.fit(state_, 1);
   about_the_mean(term());
-}
-
-namespace {
-
-/// Separable coefficients that fit best: the vectors of both factors, and their gain in log likelihood.
-struct RankOne {
-  Eigen::VectorXd one, other;
-  double gain = 0;
-};
-
-/// The best vector of one factor with that of the other fixed.
-double best_half(const Pair& pair, const ReducedColumns& data, const Eigen::VectorXd& precision, bool rows,
-                 const Eigen::VectorXd& fixed, Eigen::VectorXd& found) {
-  Eigen::MatrixXd z = Eigen::MatrixXd::Zero(data.score.size(), found.size());
-  for (std::size_t k = 0; k < pair.at.size(); ++k) {
-    const auto [i, j] = pair.at[k];
-    z(static_cast<Eigen::Index>(k), rows ? i : j) = fixed[rows ? j : i];
-  }
-  Eigen::MatrixXd information = z.transpose() * (data.information * z);
-  const Eigen::VectorXd score = z.transpose() * data.score;
-  Eigen::MatrixXd with = information + Eigen::MatrixXd(z.transpose() * precision.asDiagonal() * z);
-  with.diagonal().array() += 1e-9 * std::max(with.diagonal().maxCoeff(), 1e-300);
-  found = with.ldlt().solve(score);
-  return score.dot(found) - 0.5 * found.dot(information * found);
-}
-
-/// Alternating least squares on the quadratic approximation, from the largest row of the coefficients.
-RankOne rank_one(const Pair& pair, const ReducedColumns& data, const Term& term) {
-  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(pair.one.columns()),
-                                                 static_cast<Eigen::Index>(pair.other.columns()));
-  for (std::size_t k = 0; k < pair.at.size(); ++k)
-    matrix(pair.at[k].first, pair.at[k].second) = term.coefficients[static_cast<Eigen::Index>(k)];
-  Eigen::Index largest = 0;
-  matrix.rowwise().squaredNorm().maxCoeff(&largest);
-  RankOne out{Eigen::VectorXd::Zero(matrix.rows()), matrix.row(largest).transpose(), 0};
-  // Alternations between the two halves, which are cheap: no filter runs; fewer may end before they agree.
-  constexpr int kRounds = 40;
-  for (int round = 0; round < kRounds; ++round) {
-    if (out.other.norm() == 0) return out;
-    out.other.normalize();
-    best_half(pair, data, term.precision, true, out.other, out.one);
-    if (out.one.norm() == 0) return out;
-    out.one.normalize();
-    out.gain = best_half(pair, data, term.precision, false, out.one, out.other);
-  }
-  return out;
-}
-
-Factor with_known(Factor f, const Eigen::VectorXd& coefficients, Target target) {
-  if (f.of_two()) {
-    Term map{"", {{target, Basis{{f}}}}, coefficients, Eigen::VectorXd::Ones(coefficients.size())};
-    if (const std::optional<Factor> grid = function_of(map)) return *grid;
-  }
-  f.known.assign(coefficients.begin(), coefficients.end());
-  return f;
-}
-
-}  // namespace
-
-namespace {
-
-/// The blocks of a term on one target, and their columns among those of the term.
-struct OneTarget {
-  Term term;
-  std::vector<Eigen::Index> columns;
-};
-std::vector<OneTarget> by_target(const Term& term) {
-  std::vector<OneTarget> all;
-  Eigen::Index next = 0;
-  for (const Block& block : term.blocks) {
-    auto own = std::find_if(all.begin(), all.end(), [&](const OneTarget& one) {
-      return one.term.blocks.front().target == block.target && one.term.blocks.front().during == block.during;
-    });
-    if (own == all.end()) {
-      all.push_back({{term.name, {}, {}, {}}, {}});
-      own = all.end() - 1;
-    }
-    own->term.blocks.push_back(block);
-    for (std::size_t i = 0; i < block.basis.size(); ++i) own->columns.push_back(next++);
-  }
-  for (OneTarget& one : all) {
-    one.term.coefficients = term.coefficients(one.columns);
-    one.term.precision = term.precision(one.columns);
-  }
-  return all;
-}
-
-/// The product acts on a further target, too, with an amplitude of its own: a drift has a direction.
-void add_target(Term& product, const std::vector<Factor>& functions, const Block& like) {
-  constexpr double kPrecision = 0.01;  // weak prior of the amplitude, as in put_known
-  product.blocks.push_back({like.target, Basis{functions}, like.during});
-  const Eigen::Index had = product.coefficients.size();
-  product.coefficients.conservativeResize(had + 1);
-  product.precision.conservativeResize(had + 1);
-  product.coefficients[had] = 0;
-  product.precision[had] = kPrecision;
-}
-
-}  // namespace
-
-Term main_part(const Term& term) {
-  if (term.blocks.empty() || !is_gain(term.blocks.front().target)) return term;
-  std::vector<OneTarget> targets = by_target(term);
-  return std::max_element(targets.begin(), targets.end(),
-                          [](const OneTarget& a, const OneTarget& b) {
-                            return a.term.coefficients.norm() < b.term.coefficients.norm();
-                          })
-      ->term;
-}
-
-bool separate(const Fitter& fitter, FitState& state, std::size_t place) {
-  // Share of the main target's gain that the product form must keep to be fitted. A larger value gives up sooner; a smaller
-  // one costs fits of forms that fail.
-  constexpr double kLeastShare = 0.5;
-  const Term& term = state.model.terms[place];
-  const std::vector<OneTarget> targets = by_target(term);
-  if (std::any_of(targets.begin(), targets.end(), [](const OneTarget& one) {
-        return !pair_of(one.term) || is_measured(one.term.blocks.front().target);
-      }))
-    return false;
-  const LocalQuadratic l = local_quadratic(fitter, state, place, {});
-  const ReducedColumns all = reduced_columns(l, l.score_without(term.coefficients), l.term_columns());
-  // Of a target's columns, with those of the others at their values.
-  const auto data_of = [&](const OneTarget& one) {
-    Eigen::VectorXd others = term.coefficients;
-    others(one.columns).setZero();
-    return ReducedColumns{all.information(one.columns, one.columns),
-                          (all.score - all.information * others)(one.columns)};
-  };
-  const auto gain_of = [&](const OneTarget& one) {
-    const ReducedColumns data = data_of(one);
-    const Eigen::VectorXd& c = one.term.coefficients;
-    return data.score.dot(c) - 0.5 * c.dot(data.information * c);
-  };
-  const OneTarget& main =
-      *std::max_element(targets.begin(), targets.end(),
-                        [&](const OneTarget& a, const OneTarget& b) { return gain_of(a) < gain_of(b); });
-  const Pair pair = *pair_of(main.term);
-  const RankOne one = rank_one(pair, data_of(main), main.term);
-  if (!(one.gain > kLeastShare * gain_of(main))) return false;
-  const Eigen::VectorXd sd = term.precision.cwiseInverse().cwiseSqrt();
-  const double cost = -log_evidence(all.information, Eigen::VectorXd::Zero(sd.size()), sd),
-               value = fitter.log_likelihood(state) - cost;
-  FitState trial = state;
-  trial.model.terms[place] = main.term;
-  const Target target = main.term.blocks.front().target;
-  ProductFit product(fitter, trial, place,
-                     {with_known(pair.one, one.one, target), with_known(pair.other, one.other, target)});
-  product.fit();
-  const std::vector<Factor> functions = functions_of(trial.model.terms[place]);
-  if (functions.empty()) return false;
-  for (const OneTarget& other : targets)
-    if (&other != &main) add_target(trial.model.terms[place], functions, other.term.blocks.front());
-  if (targets.size() > 1) fitter.fit(trial, 2);
-  // Negated, so that a likelihood that is no number does not count.
-  if (!(fitter.log_likelihood(trial) - product.cost() > value)) return false;
-  state = std::move(trial);
-  return true;
 }
 
 namespace {

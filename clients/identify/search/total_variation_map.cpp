@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "clients/identify/search/product_functions.hpp"
 #include "clients/identify/search/total_variation_solver.hpp"
 #include "core/os/worker_pool.hpp"
 #include "core/stats/quantiles.hpp"
@@ -137,8 +138,6 @@ std::vector<NormalEquations> sums_of(const Fitter& fitter, const FitState& state
   });
   return folds;
 }
-
-bool is_of_place(const Factor& f) { return f.axis.of == Covariate::kX || f.axis.of == Covariate::kY; }
 
 /// Whether a block is a smooth map of the speed or of the turn rate, up to known factors.
 bool is_map(const Block& block) {
