@@ -8,7 +8,6 @@
 #include "core/base/message_crc.h"
 #include "core/base/spin_up.hpp"
 #include "core/base/state_hash.hpp"
-#include "core/plan/tracking_settings.hpp"
 
 namespace kilotwin::behaviours {
 namespace {
@@ -31,8 +30,6 @@ constexpr std::int64_t kManyCalls = 64;
 /// Draws of Stream::kProgram per robot and tick.
 constexpr std::uint32_t kNoiseSeed = 0, kInterruptedCycle = 1;
 
-constexpr std::uint16_t kInitialTxPeriod = 3906;  // kilolib: half a second in counts of 128 us
-
 }  // namespace
 
 /// One robot's program in one tick.
@@ -44,70 +41,6 @@ struct BehavioursEngine::Span {
   /// Cycles of a call of loop() that changes nothing and was skipped for the rest of the tick; 0: no call was skipped.
   std::int32_t call_cycles = 0;
 };
-
-BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared_ptr<ProgramSet> programs)
-    : plan_(plan),
-      host_(host),
-      share_(plan.share(host)),
-      random_(plan.seed()),
-      parameters_(plan),
-      programs_(std::move(programs)),
-      senses_(plan, share_),
-      memory_(share_.size()),
-      calibrated_(share_.size(), 0),
-      eeprom_(share_.size()),
-      presence_(share_.size(), Presence::kNone),
-      motor_left_(share_.size()),
-      motor_right_(share_.size()),
-      spin_up_(share_.size()),
-      led_(share_.size()),
-      life_cycle_(share_.size(), static_cast<std::uint8_t>(LifeCycle::kIdle)),
-      motor_share_(share_.size()),
-      absent_(share_.size()),
-      seen_led_(share_.size(), kUnknownLed),
-      tx_period_(share_.size(), kInitialTxPeriod),
-      holds_(share_.size()),
-      offers_(share_.size()),
-      message_(share_.size()),
-      crc_error_(share_.size()),
-      is_due_(share_.size()),
-      due_(share_.size()),
-      requested_(share_.size()),
-      sent_(share_.size()),
-      first_reception_(share_.size() + 1),
-      wait_period_(share_.size()),
-      probes_(programs_->size()),
-      warned_(programs_->size()) {
-  KILOTWIN_DEMAND(programs_->size() == static_cast<std::uint32_t>(plan.programs().size()));
-  for (const RobotEeprom& brought : plan.eeproms()) {
-    if (!share_.contains(brought.robot)) continue;
-    auto& eeprom = eeprom_[brought.robot - share_.first] = std::make_unique<Eeprom>();
-    std::copy_n(brought.content.begin(), eeprom->size(), eeprom->begin());
-  }
-  for (std::uint32_t i = 0; i < share_.size(); ++i) {
-    if (!plan.tracked(share_.first + i) || plan.tracking_settings().present_at_start) continue;
-    absent_[i] = 1;
-    life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kAbsent);
-  }
-  if (const RadioParameters radios(plan); radios.own_tables()) calibrate_ranging(radios);
-  // Hosts in one process start at different slots, so that they seldom wait for each other's mutex.
-  const std::uint32_t first_slot = host.value() * kSlots / std::max(plan.hosts, 1u);
-  for (std::uint32_t s = 0; s < kSlots; ++s) {
-    for (std::uint32_t p = 0; p < programs_->size(); ++p) {
-      if (plan.programs()[p].firmware) continue;
-      Group group{p, (first_slot + s) % kSlots, {}};
-      for (std::uint32_t i = 0; i < share_.size(); ++i) {
-        const std::uint32_t robot = share_.first + i;
-        if (robot % kSlots == group.slot && plan.program_of(robot) == p) group.robots.push_back(i);
-      }
-      for (const std::uint32_t i : group.robots) presence_[i] = Presence::kNew;
-      if (!group.robots.empty()) groups_.push_back(std::move(group));
-    }
-  }
-  for (std::uint32_t i = 0; i < share_.size(); ++i) {
-    if (plan.firmware(share_.first + i)) presence_[i] = Presence::kFirmware;
-  }
-}
 
 void BehavioursEngine::gather(const RadioFrame& radio) {
   auto own = [&](std::uint32_t robot) {
@@ -173,91 +106,6 @@ void BehavioursEngine::step(Tick from, const RadioFrame& radio, const SwarmView*
   if (tracked.frame != nullptr) follow(*tracked.frame);
   if (!senses_.has_batteries()) return;
   for (std::uint32_t i = 0; i < share_.size(); ++i) use_battery(i);
-}
-
-void BehavioursEngine::take_memberships(const TrackedInputs& tracked) {
-  for (const MembershipChange& change : tracked.memberships) {
-    if (!share_.contains(change.robot)) continue;
-    const std::uint32_t i = change.robot - share_.first;
-    absent_[i] = static_cast<std::uint8_t>(change.membership != Membership::kJoined);
-    if (absent_[i] != 0) {
-      life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kAbsent);
-      motor_left_[i] = motor_right_[i] = spin_up_[i] = led_[i] = holds_[i] = is_due_[i] = 0;
-    } else if (presence_[i] == Presence::kFailed) {
-      life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kFailed);
-    } else {
-      life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kIdle);
-    }
-  }
-}
-
-/// Tracked robots show the LED that was seen, and say what rules have for them.
-void BehavioursEngine::follow(const TrackingFrame& frame) {
-  KILOTWIN_DEMAND(frame.tick + 1 == now_);
-  for (std::size_t n = 0; n < frame.robot.size(); ++n) {
-    if (!share_.contains(frame.robot[n])) continue;
-    const std::uint32_t i = frame.robot[n] - share_.first;
-    if (frame.led[n] != kUnknownLed) seen_led_[i] = frame.led[n];
-    if (absent_[i] != 0) continue;
-    if (presence_[i] == Presence::kNone && !plan_.tracking_settings().says_heard(frame.robot[n]))
-      say_by_rule(i, {frame.x_mm[n], frame.y_mm[n], frame.heading_rad[n]});
-  }
-  for (std::size_t n = 0; n < frame.said_robot.size(); ++n) {
-    const std::uint32_t i = frame.said_robot[n] - share_.first;
-    if (!share_.contains(frame.said_robot[n]) || absent_[i] != 0) continue;
-    due_[i] = frame.said_message[n];
-    is_due_[i] = 1;
-  }
-  say_what_was_heard();
-  for (std::uint32_t i = 0; i < share_.size(); ++i) {
-    if (absent_[i] == 0 && plan_.tracked(share_.first + i))
-      led_[i] = seen_led_[i] == kUnknownLed ? std::uint8_t{0} : seen_led_[i];
-  }
-}
-
-/// A message that was heard is said once, as soon as the channel is free. A newer one takes the place of one that waits.
-void BehavioursEngine::say_what_was_heard() {
-  for (std::uint32_t i = 0; i < share_.size(); ++i) {
-    const std::uint32_t robot = share_.first + i;
-    if (!plan_.tracked(robot) || presence_[i] != Presence::kNone || absent_[i] != 0 ||
-        !plan_.tracking_settings().says_heard(robot))
-      continue;
-    if (sent_[i] != 0) holds_[i] = 0;
-    life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kRunning);
-    tx_period_[i] = 0;
-    if (is_due_[i] == 0 || requested_[i] == 0 || holds_[i] != 0) continue;
-    message_[i] = due_[i];
-    crc_error_[i] = 0;
-    is_due_[i] = 0;
-    holds_[i] = offers_[i] = 1;
-  }
-}
-
-void BehavioursEngine::say_by_rule(std::uint32_t i, const Pose& p_WR) {
-  const std::uint32_t robot = share_.first + i;
-  const std::uint8_t led = seen_led_[i];
-  const auto applies = [&](const SaysRuleSettings& rule) {
-    if (!rule.robots.empty() && !std::binary_search(rule.robots.begin(), rule.robots.end(), robot)) return false;
-    if (rule.led && *rule.led != led) return false;
-    if (!rule.circle) return true;
-    const double dx = p_WR.x_mm - rule.circle->x_mm, dy = p_WR.y_mm - rule.circle->y_mm;
-    return dx * dx + dy * dy <= rule.circle->radius_mm * rule.circle->radius_mm;
-  };
-  if (sent_[i] != 0) holds_[i] = 0;
-  const std::vector<SaysRuleSettings>& rules = plan_.tracking_settings().rules_of(robot);
-  const auto rule = std::find_if(rules.begin(), rules.end(), applies);
-  if (rule == rules.end()) {
-    life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kIdle);
-    holds_[i] = 0;
-    return;
-  }
-  life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kRunning);
-  tx_period_[i] = rule->tx_period;
-  if (requested_[i] == 0 || holds_[i] != 0) return;
-  message_[i] = rule->message;
-  crc_error_[i] = 0;
-  if (rule->id_octet) message_[i][*rule->id_octet] = static_cast<std::uint8_t>(robot & 255);
-  holds_[i] = offers_[i] = 1;
 }
 
 /// Copies the outputs of firmware robots at tick k into the frame of tick k + 1. Programs that run here have the same delay, so
@@ -595,21 +443,6 @@ void BehavioursEngine::keep_eeprom(std::uint32_t i, const Slot& slot) {
   if (eeprom_[i]) return;
   eeprom_[i] = std::make_unique<Eeprom>();
   std::copy_n(slot.surroundings()->eeprom_copy, eeprom_[i]->size(), eeprom_[i]->begin());
-}
-
-/// Gives each robot without a stated EEPROM one with its own ranging table.
-void BehavioursEngine::calibrate_ranging(const RadioParameters& radios) {
-  for (std::uint32_t i = 0; i < share_.size(); ++i) {
-    const std::uint32_t id = share_.first + i;
-    if (eeprom_[i] || plan_.program_of(id) == kNoProgram || plan_.firmware(id)) continue;
-    const Calibration& calibration = parameters_.calibration(id);
-    const RangingTable table = radios.table(id);
-    eeprom_[i] = std::make_unique<Eeprom>();
-    kilotwin_fill_eeprom(eeprom_[i]->data(), {plan_.uid_of(id), calibration.turn_left, calibration.turn_right,
-                                              calibration.straight_left, calibration.straight_right});
-    calibrated_[i] = 1;
-    kilotwin_fill_ranging(eeprom_[i]->data(), table.high.data(), table.low.data());
-  }
 }
 
 void BehavioursEngine::reset_robot(Tick tick, std::uint32_t i, const Program& program, const Slot& slot) {
