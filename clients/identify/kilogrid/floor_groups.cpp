@@ -42,10 +42,8 @@ std::vector<StatisticGroup> make_groups() {
     for (std::size_t i = 0; i < n; ++i) labels.push_back(fmt::format(fmt::runtime(format), i));
     return labels;
   };
-  std::vector<int> lags_s;
-  for (const int lag : kLags) lags_s.push_back(lag * 10);
   add("step", "history", each(kSteps_mm, "from {} mm in 10 s"));
-  add("msd", "history", each(lags_s, "root mean square displacement in {} s, mm"));
+  add("msd", "history", each(kLags_s, "root mean square displacement in {} s, mm"));
   add("step-by-wall", "position", each(kWalls_mm, "mean step from {} mm wall distance, mm"));
   add("occupancy", "position", counted(kRings, "ring {}"));
   add("step-by-time", "time", counted(kTimeBins, "mean step in 5 minutes {}, mm"));
@@ -70,8 +68,7 @@ std::vector<StatisticGroup> make_groups() {
   add("occupancy-along-y", "position", counted(kAcross, "tenth {}"));
   add("way-to-the-middle-along-x", "position", counted(kToMiddle, "in 100 s from fifth {}, of the middle, mm"));
   add("way-to-the-middle-along-y", "position", counted(kToMiddle, "in 100 s from fifth {}, of the middle, mm"));
-  std::vector<int> lasting_s;
-  for (const int lag : kLasting) lasting_s.push_back(lag * 10);
+  const std::array lasting_s = in_seconds(kLasting);
   add("speed-lasts", "history", each(lasting_s, "product of steps, lag {} s"));
   add("turning-lasts", "history", each(lasting_s, "product of turns, lag {} s"));
   const std::vector<std::string>& features = feature_names();

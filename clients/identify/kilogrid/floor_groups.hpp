@@ -26,6 +26,18 @@ inline constexpr std::size_t kAcross = 10, kToMiddle = 5;
 inline constexpr std::size_t kWay = 10;  ///< lag in blocks for motion towards the middle
 inline constexpr std::array kLasting = {1, 2, 5, 10, 20, 60};
 
+/// Typical displacement per block, about which squares and products of steps are taken. Variances from
+/// their means (floor_plots.cpp) need the same value.
+inline constexpr double kAboutSpeed_mm = 75;
+
+/// Lags in blocks as seconds.
+template <std::size_t N> constexpr std::array<int, N> in_seconds(const std::array<int, N>& blocks) {
+  std::array<int, N> lags_s{};
+  for (std::size_t i = 0; i < N; ++i) lags_s[i] = blocks[i] * static_cast<int>(FloorBlocks::kBlock_s);
+  return lags_s;
+}
+inline constexpr std::array kLags_s = in_seconds(kLags);
+
 /// Bin edges of a track window feature (the first bin is open below), and location and scale for products of
 /// features.
 struct FeatureScale {

@@ -6,13 +6,12 @@
 #include <array>
 #include <cmath>
 
+#include "clients/identify/kilogrid/floor_groups.hpp"
+
 namespace kilotwin::kilogrid {
 namespace {
 
 using identify::json_list, identify::json_value;
-
-/// Of the statistics "msd".
-constexpr std::array kLags_s = {10, 20, 50, 100, 200, 300, 600};
 
 /// Residual speed of simulated runs over one covariate, mm/s.
 identification::CovariatePlot plot_of(const char* name, const char* covariate, const char* unit,
@@ -117,8 +116,8 @@ identification::Table table_of_motion(const FloorTarget& held_out, const FloorSt
       return sum;
     };
   };
-  for (std::size_t i = 0; i < kLags_s.size(); ++i) {
-    row(fmt::format("root mean square displacement in {} s, mm", kLags_s[i]), "{:.0f}",
+  for (std::size_t i = 0; i < groups::kLags_s.size(); ++i) {
+    row(fmt::format("root mean square displacement in {} s, mm", groups::kLags_s[i]), "{:.0f}",
         [&, i](const auto& v) { return std::sqrt(value("msd", i)(v)); });
   }
   // Spread between robots about the common mean. The product of two half runs isolates the persistent part.
@@ -132,10 +131,8 @@ identification::Table table_of_motion(const FloorTarget& held_out, const FloorSt
     row(name + ": correlation between the halves of a run", "{:.2f}",
         [=](const auto& v) { return variance(v, 2) / variance(v, 1); });
   };
-  // Rate of blocks, and the step that floor_statistics.cpp takes squares about: another one here would give wrong
-  // variances.
-  constexpr double kPerSecond = 1 / FloorBlocks::kBlock_s, kAboutSpeed_mm = 75;
-  add_own("speed", kAboutSpeed_mm, kPerSecond, "speed on the open floor, mm/s", "{:.2f}");
+  constexpr double kPerSecond = 1 / FloorBlocks::kBlock_s;  // rate of blocks
+  add_own("speed", groups::kAboutSpeed_mm, kPerSecond, "speed on the open floor, mm/s", "{:.2f}");
   add_own("turn-bias", 0, kPerSecond, "mean turn rate, rad/s", "{:+.4f}");
   row("rest on the open floor: episodes of 10 s or more per 1000 blocks", "{:.1f}", value("still-in-the-open", 0));
   row("... of 30 s or more", "{:.2f}", value("still-in-the-open", 2));
@@ -156,7 +153,7 @@ void add_plots(identification::Identification& out, const FloorTarget& held_out,
                const FloorStatistics& after) {
   const StatisticGroup& ways = statistic_group("msd");
   identification::Msd& msd = *out.mutable_msd();
-  for (std::size_t s = 0; s < ways.size(); ++s) msd.add_lag_s(kLags_s[s]);
+  for (std::size_t s = 0; s < ways.size(); ++s) msd.add_lag_s(groups::kLags_s[s]);
   *msd.mutable_measured_mm2() = numbers(held_out.statistics().value, ways, false);
   *msd.mutable_simulated_mm2() = numbers(after.value, ways, false);
   const double pi = 3.14159265358979;

@@ -26,8 +26,7 @@ constexpr std::size_t kExtentFeature = 8;  ///< index of the extent feature, in 
 constexpr double kExtentScale_mm = 100;
 constexpr double kMiddle_mm = 300;  ///< distance from walls
 constexpr double kNear_mm = 100;
-constexpr double kAboutSpeed_mm = 75;  ///< typical displacement per block
-constexpr double kGentle_rad = 1.2;    ///< turns by bias while driving straight, not by the walk
+constexpr double kGentle_rad = 1.2;  ///< turns by bias while driving straight, not by the walk
 
 /// Accumulates the contribution of one robot.
 class Sums {
