@@ -6,9 +6,11 @@
 namespace kilotwin::identify {
 namespace {
 
-/// Runs from which on the last quarter of them is held out, else robots from which on every fourth is. With fewer of both,
-/// the second of two runs is held out, or nothing.
+/// Runs from which on the last of them are held out, else robots from which on some are. With fewer of both, the second of
+/// two runs is held out, or nothing.
 constexpr std::size_t kRunsToHoldOut = 3, kRobotsToHoldOut = 4;
+/// Runs, or robots, of which one is held out. A larger value leaves more to the fit, less to the choice and the reported error.
+constexpr std::size_t kHeldOutOneIn = 4;
 
 HeldOut held_out_of(const MeasuredSet& train, Tracks of) {
   const auto held = [](const Track& track) { return track.held_out; };
@@ -24,6 +26,8 @@ HeldOut held_out_of(const MeasuredSet& train, Tracks of) {
 
 /// Lets every other held-out robot choose; without two robots, every other held-out track.
 void divide_held_out(MeasuredSet& set) {
+  // Held-out robots, or tracks, of which one chooses; a larger value leaves more to the reported error, less to the choice.
+  constexpr std::size_t kChoosesOneIn = 2;
   std::vector<Track*> held;
   std::vector<std::uint32_t> robots;
   for (Run& run : set.runs)
@@ -33,7 +37,8 @@ void divide_held_out(MeasuredSet& set) {
   robots.erase(std::unique(robots.begin(), robots.end()), robots.end());
   for (std::size_t i = 0; i < held.size(); ++i) {
     const auto place = std::lower_bound(robots.begin(), robots.end(), held[i]->robot) - robots.begin();
-    held[i]->chooses = (robots.size() > 1 ? static_cast<std::size_t>(place) : i) % 2 == 1;
+    const std::size_t number = robots.size() >= kChoosesOneIn ? static_cast<std::size_t>(place) : i;
+    held[i]->chooses = number % kChoosesOneIn == kChoosesOneIn - 1;
   }
 }
 
@@ -64,7 +69,7 @@ std::string in_words(HeldOut held_out) {
 
 void hold_out_part(MeasuredSet& set) {
   if (set.runs.size() >= kRunsToHoldOut) {
-    const std::size_t keep = set.runs.size() - std::max<std::size_t>(1, set.runs.size() / 4);
+    const std::size_t keep = set.runs.size() - std::max<std::size_t>(1, set.runs.size() / kHeldOutOneIn);
     for (std::size_t r = keep; r < set.runs.size(); ++r)
       for (Track& track : set.runs[r].tracks) track.held_out = true;
     return divide_held_out(set);
@@ -73,8 +78,9 @@ void hold_out_part(MeasuredSet& set) {
   for (Run& run : set.runs) {
     for (Track& track : run.tracks) {
       const auto place = std::lower_bound(robots.begin(), robots.end(), track.robot) - robots.begin();
-      track.held_out =
-          robots.size() >= kRobotsToHoldOut ? place % 4 == 3 : set.runs.size() == 2 && &run == &set.runs.back();
+      track.held_out = robots.size() >= kRobotsToHoldOut
+                           ? static_cast<std::size_t>(place) % kHeldOutOneIn == kHeldOutOneIn - 1
+                           : set.runs.size() == 2 && &run == &set.runs.back();
     }
   }
   divide_held_out(set);

@@ -14,7 +14,9 @@ void add_robot_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   const auto n = static_cast<Eigen::Index>(keys.size());
   const auto gains = make.put(kSpeed, Basis{{keyed(Shape::kTable, Covariate::kRobot, keys)}});
   make.add(kSpeed, "robot", {"robot"}, some(gains, 0, n));
-  if (keys.size() > 40) return;
+  // Robots; with more, only the gains above are tried. A larger value costs a column per robot in each of the hypotheses below.
+  constexpr std::size_t kMostForAll = 40;
+  if (keys.size() > kMostForAll) return;
   const auto slopes = make.put(kSpeed, Basis{{keyed(Shape::kTable, Covariate::kRobot, keys),
                                               over(Shape::kLinear, Covariate::kTime, 0, extent.duration_s, 1)}});
   make.add(kSpeed, "robot-and-time", {"robot", "time"}, some(slopes, 0, n));
