@@ -26,10 +26,12 @@ void FilterBank::advance_to(double to_s) {
 
 void FilterBank::take(const Sample& sample) {
   if (next_ == 0) return start(sample);
-  // Beside many headings nobody can tell a spell.
+  // Beside many headings nobody can tell a spell, nor a push. A larger value takes them for the causes of a wrong heading's errors.
   constexpr std::size_t kFewHeadings = 2;
+  const bool few = hypotheses_.front().spell || hypotheses_.size() <= kFewHeadings;
+  for (Hypothesis& h : hypotheses_) h.filter.contacts_displace(few);
   const double weight = total_of(hypotheses_);
-  if (model_.stalls && (hypotheses_.front().spell || hypotheses_.size() <= kFewHeadings))
+  if (model_.stalls && few)
     hypotheses_ = with_spells(sample);
   else
     for (Hypothesis& h : hypotheses_) carry(h, sample);

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
+#include <utility>
 
 #include "core/stats/distributions.hpp"
 
@@ -116,6 +117,10 @@ Situation TrackFilter::situation(double time_s, const Eigen::Vector3d& pose, con
 
 StepRecord TrackFilter::step(double time_s, double h_s, const CommandState& commands, const NeighbourView& near) {
   StepRecord record = step_freely(time_s, h_s, commands, near);
+  touched_ = touched_ || record.at_robot;
+  // The nearest centre is as unsure as the headings, by twice the offset from the tracked point.
+  const double reach_mm = model_->contact_range_mm + 2 * std::abs(model_->base.centre_mm - model_->base.ahead_mm);
+  beside_ = beside_ || (model_->contacts && near.nearest_mm < reach_mm);
   apply_walls();
   return record;
 }
@@ -290,6 +295,28 @@ void TrackFilter::keep_within_walls(Eigen::Vector3d& difference) const {
   keep(1, belief_.centre_y_mm(), walls.y_low_mm, walls.y_high_mm);
 }
 
+void TrackFilter::displace(Innovation& out, Eigen::Matrix3d s) {
+  outliers_ = 0;
+  StateCovariance& p = belief_.covariance;
+  // Beyond its expectation, the number of dimensions, the push is as large as it looks.
+  if (out.distance2 > out.size) {
+    const double way_mm2 = out.difference.head<2>().squaredNorm() / 2;
+    p(0, 0) += way_mm2;
+    p(1, 1) += way_mm2;
+    s.topLeftCorner<2, 2>() +=
+        way_mm2 * out.jacobian.topLeftCorner<2, 2>() * out.jacobian.topLeftCorner<2, 2>().transpose();
+  }
+  const Eigen::Matrix<double, 5, 3> ph = p.leftCols<3>() * out.jacobian.transpose();
+  out.covariance = s;
+  out.gain = ph * s.inverse();
+  out.gain.bottomRows<3>().setZero();
+  belief_.mean += out.gain * out.difference;
+  const StateCovariance known = out.gain * ph.transpose();
+  p += out.gain * (s * out.gain.transpose()) - known - known.transpose();
+  p = (0.5 * (p + p.transpose())).eval();
+  out.log_likelihood = 0;
+}
+
 Innovation TrackFilter::update(const Sample& sample, const CommandState& commands) {
   Innovation out;
   out.size = has_heading(sample) ? 3 : 2;
@@ -309,7 +336,12 @@ Innovation TrackFilter::update(const Sample& sample, const CommandState& command
   s(2, 2) = out.size == 3 ? s(2, 2) + noise.heading_rad2 : 1;
   Eigen::Matrix3d inverse = s.inverse();
   out.distance2 = out.difference.dot(inverse * out.difference);
+  const bool touched = std::exchange(touched_, false), beside = std::exchange(beside_, false);
   const double factor = outlier_factor(out.distance2, out.size);
+  if (contacts_displace_ && out.size == 2 && (touched || (beside && factor > 1))) {
+    displace(out, s);
+    return out;
+  }
   if (factor > 1) {
     out.weight = 1 / factor;
     outliers_ = out.distance2 > kFar ? outliers_ + 1 : 0;

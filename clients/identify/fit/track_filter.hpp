@@ -97,6 +97,10 @@ class TrackFilter {
   /// and robots that push against them are left out of its fit. Not for fits of walls, which such places contradict.
   void stay_within_walls() { within_walls_ = !model_->walls_uncertain; }
 
+  /// For the next measurements without headings: whether positions in contact with another robot tell where the robot is, and not where
+  /// it heads. Its motion there is the other's push. (Schmidt, 1966: an update that considers states without estimating them.)
+  void contacts_displace(bool displace) { contacts_displace_ = displace; }
+
   [[nodiscard]] const Belief& belief() const { return belief_; }
   [[nodiscard]] Belief& belief() { return belief_; }
   /// The predicted measurement, and the trace of its position covariance without tracker noise, mm^2.
@@ -115,6 +119,8 @@ class TrackFilter {
   [[nodiscard]] Eigen::Matrix3d jacobian(const Situation&) const;
   void apply_spells(StepRecord&) const;
   void propagate_covariance(const StepRecord&);
+  /// Takes the difference for a displacement by another robot: the heading stays as it is.
+  void displace(Innovation&, Eigen::Matrix3d covariance);
   void keep_within_walls(Eigen::Vector3d& difference) const;
 
   const MotionModel* model_;
@@ -126,6 +132,8 @@ class TrackFilter {
   bool forecasting_ = false;
   bool at_boundary_ = false;
   bool within_walls_ = false;
+  bool contacts_displace_ = false;
+  bool touched_ = false, beside_ = false;  ///< since the last measurement: in contact with a robot, or perhaps so
   double spell_share_ = 0, spell_variance_s_ = 0;
   double random_share_ = 0, random_variance_s_ = 0;  ///< the same at a random instant
   bool spell_unsure_ = false;

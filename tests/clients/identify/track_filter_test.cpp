@@ -136,6 +136,48 @@ TEST(FilterBank, ACameraMapThatShowsRobotsBeyondAWallIsWrongThere) {
   EXPECT_NEAR(belief.centre_x_mm(), kWall_mm, 3);
 }
 
+/// Robot 0 drives straight, meets robot 1, which rests, and is jammed there. It creeps aside, for the contact yields.
+MeasuredSet jammed(const MotionModel& model, double heading_rad, double meets_s) {
+  constexpr double kCreep_mm_s = 1.5;
+  MeasuredSet set;
+  Run& run = set.runs.emplace_back();
+  Track& moves = run.tracks.emplace_back();
+  moves.commands = {{-1e300, Motion::kStraight}};
+  Track& rests = run.tracks.emplace_back();
+  rests.robot = 1;
+  rests.commands = {{-1e300, Motion::kStop}};
+  const double c = std::cos(heading_rad), s = std::sin(heading_rad);
+  const double apart_mm = model.base.straight_mm_s * meets_s + model.base.centre_mm + kDiscDiameter_mm;
+  for (double t = 0; t < 45; t += 0.5) {
+    const double way_mm = model.base.straight_mm_s * std::min(t, meets_s);
+    const double aside_mm = kCreep_mm_s * std::max(0.0, t - meets_s);
+    moves.samples.push_back({t, way_mm * c - aside_mm * s, way_mm * s + aside_mm * c, std::nan("")});
+    rests.samples.push_back({t, apart_mm * c - aside_mm * s, apart_mm * s + aside_mm * c, std::nan("")});
+  }
+  return set;
+}
+
+TEST(FilterBank, ARobotThatIsJammedKeepsItsHeading) {
+  constexpr double kHeading_rad = 0.7, kMeets_s = 20;
+  MotionModel model;
+  model.base.ahead_mm = 0;
+  model.contacts = true;
+  for (std::uint32_t robot = 0; robot < 2; ++robot)
+    model.robots[robot] = {Eigen::Vector2d::Zero(), 1e-4 * Eigen::Matrix2d::Identity()};
+  const MeasuredSet set = jammed(model, kHeading_rad, kMeets_s);
+  PreparedSet prepared(set);
+  prepared.find_centres(model, 1);
+  FilterBank bank(model, prepared.views().front());
+  bank.advance_to(45);
+  EXPECT_EQ(bank.hypotheses().size(), 1u);
+  EXPECT_NEAR(wrapped_angle(bank.hypotheses().front().filter.belief().mean[2] - kHeading_rad), 0, 0.1);
+  // Where robots do not touch each other, the same track shows another heading.
+  model.contacts = false;
+  FilterBank alone(model, prepared.views().front());
+  alone.advance_to(45);
+  EXPECT_LT(weight_near(alone, kHeading_rad), 0.5);
+}
+
 TEST(FilterBank, KeepsAHypothesisIfNoWeightIsFinite) {
   MeasuredSet set;
   Track& track = set.runs.emplace_back(identify::Run{"r", {}}).tracks.emplace_back();
