@@ -140,10 +140,10 @@ TEST(FilterBank, ACameraMapThatShowsRobotsBeyondAWallIsWrongThere) {
 MeasuredSet jammed(const MotionModel& model, double heading_rad, double meets_s) {
   constexpr double kCreep_mm_s = 1.5;
   MeasuredSet set;
-  Run& run = set.runs.emplace_back();
-  Track& moves = run.tracks.emplace_back();
+  std::vector<Track>& tracks = set.runs.emplace_back().tracks;
+  tracks.resize(2);
+  Track &moves = tracks.front(), &rests = tracks.back();
   moves.commands = {{-1e300, Motion::kStraight}};
-  Track& rests = run.tracks.emplace_back();
   rests.robot = 1;
   rests.commands = {{-1e300, Motion::kStop}};
   const double c = std::cos(heading_rad), s = std::sin(heading_rad);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "clients/identify/kilogrid/fast_swarm.hpp"
 #include "clients/identify/kilogrid/floor_selection.hpp"
@@ -53,9 +54,10 @@ TEST(FloorFit, RecoversTheSpeedAndTheRange) {
   EXPECT_NEAR(model.values[4], 46, 2.8);
   // Standard errors say how far off the values are, and fall as runs are added.
   const std::vector<double> sd = standard_errors(model, target, 3);
-  for (const std::size_t p : {0u, 2u, 4u}) {
-    // The fit ends where its simulations no longer tell models apart: standard errors do not contain that. The spread is off by more.
-    EXPECT_LT(std::abs(model.values[p] - truth.values[p]), p == 2 ? 0.5 : 4 * sd[p]) << p;
+  // Fits of these runs with six other seeds scatter by this much, for they end in the noise of their own simulations.
+  const std::map<std::size_t, double> scatter{{0, 0.13}, {2, 0.11}, {4, 1.2}};
+  for (const auto& [p, of_fit] : scatter) {
+    EXPECT_LT(std::abs(model.values[p] - truth.values[p]), 4 * std::hypot(sd[p], of_fit)) << p;
     EXPECT_LT(sd[p], model.parameters()[p].width) << p;
   }
   std::vector<FloorRun> more = runs_of(truth, 100);
