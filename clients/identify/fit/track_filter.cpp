@@ -314,7 +314,6 @@ void TrackFilter::displace(Innovation& out, Eigen::Matrix3d s) {
   const StateCovariance known = out.gain * ph.transpose();
   p += out.gain * (s * out.gain.transpose()) - known - known.transpose();
   p = (0.5 * (p + p.transpose())).eval();
-  out.log_likelihood = 0;
 }
 
 Innovation TrackFilter::update(const Sample& sample, const CommandState& commands) {
@@ -338,7 +337,11 @@ Innovation TrackFilter::update(const Sample& sample, const CommandState& command
   out.distance2 = out.difference.dot(inverse * out.difference);
   const bool touched = std::exchange(touched_, false), beside = std::exchange(beside_, false);
   const double factor = outlier_factor(out.distance2, out.size);
-  if (contacts_displace_ && out.size == 2 && (touched || (beside && factor > 1))) {
+  // In contact a position says nothing of the heading. An outlier that need not be a push counts against its hypothesis.
+  const bool displaces = contacts_displace_ && out.size == 2;
+  if (!(displaces && touched))
+    out.log_likelihood = -0.5 * (std::log(s.determinant()) + out.size * std::log(factor) + out.distance2 / factor);
+  if (displaces && (touched || (beside && factor > 1))) {
     displace(out, s);
     return out;
   }
@@ -348,7 +351,6 @@ Innovation TrackFilter::update(const Sample& sample, const CommandState& command
   } else {
     outliers_ = 0;
   }
-  out.log_likelihood = -0.5 * (std::log(s.determinant()) + out.size * std::log(factor) + out.distance2 / factor);
   if (outliers_ >= kLostAfter) {
     // Restart at the measured position. The heading is measured, or gets a larger variance.
     out.lost = true;

@@ -20,7 +20,7 @@ double fit(FloorModel&, const FloorTarget&, int rounds, double width, std::uint6
 /// inference, 1993): the variances of the statistics between robots and runs, carried through the slopes of the statistics. The larger
 /// counts of two. One takes the statistics as independent in the metric of the fit; the other is a jackknife over robots, since
 /// statistics of the same robots depend on each other. Neither has the scatter of fits with other seeds, which end in the noise of their
-/// own simulations: of 120 robots x 1000 s, it is 0.11 mm/s of a spread of speeds whose standard error is 0.08 mm/s. Infinite where no
+/// own simulations: of 120 robots x 1000 s, it is 0.12 mm/s of a spread of speeds whose standard error is 0.08 mm/s. Infinite where no
 /// statistic depends on the parameter.
 [[nodiscard]] std::vector<double> standard_errors(const FloorModel&, const FloorTarget&, std::uint64_t seed);
 

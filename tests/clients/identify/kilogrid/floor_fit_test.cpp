@@ -55,7 +55,7 @@ TEST(FloorFit, RecoversTheSpeedAndTheRange) {
   // Standard errors say how far off the values are, and fall as runs are added.
   const std::vector<double> sd = standard_errors(model, target, 3);
   // Fits of these runs with six other seeds scatter by this much, for they end in the noise of their own simulations.
-  const std::map<std::size_t, double> scatter{{0, 0.13}, {2, 0.11}, {4, 1.2}};
+  const std::map<std::size_t, double> scatter{{0, 0.12}, {2, 0.12}, {4, 1.2}};
   for (const auto& [p, of_fit] : scatter) {
     EXPECT_LT(std::abs(model.values[p] - truth.values[p]), 4 * std::hypot(sd[p], of_fit)) << p;
     EXPECT_LT(sd[p], model.parameters()[p].width) << p;
