@@ -105,6 +105,8 @@ void add_target(Term& product, const std::vector<Factor>& functions, const Block
 Term main_part(const Term& term) {
   if (term.blocks.empty() || !is_gain(term.blocks.front().target)) return term;
   std::vector<OneTarget> targets = by_target(term);
+  // The numbers of other targets have other units.
+  std::erase_if(targets, [](const OneTarget& one) { return !is_gain(one.term.blocks.front().target); });
   return std::max_element(targets.begin(), targets.end(),
                           [](const OneTarget& a, const OneTarget& b) {
                             return a.term.coefficients.norm() < b.term.coefficients.norm();

@@ -6,6 +6,7 @@
 
 #include "clients/identify/search/amplitudes.hpp"
 #include "clients/identify/search/hypotheses.hpp"
+#include "clients/identify/search/products.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin::identify {
@@ -174,6 +175,29 @@ TEST(History, AnEffectOfPositionIsAlsoTestedOverTime) {
   const double there = 0.1 * std::cos(M_PI * 0.4) - 0.3 * std::cos(M_PI * 0.85);
   for (std::size_t k = 0; k < term.blocks[0].basis.size(); ++k)
     EXPECT_NEAR(values[k], there * std::cos(M_PI * static_cast<double>(k + 1) * 0.25), 1e-4);
+}
+
+TEST(History, WhatActsBesideAGainDoesNotHideIt) {
+  // A map of gains with a small part in mm/s along the heading, whose numbers are larger.
+  Extent extent;
+  extent.robots = {3, 5, 9};
+  extent.x_low_mm = extent.y_low_mm = -100;
+  extent.x_high_mm = extent.y_high_mm = 100;
+  Factor map;
+  map.shape = Factor::Shape::kCosines2;
+  map.axis.of = Covariate::kX;
+  map.and_axis.of = Covariate::kY;
+  map.low = map.and_low = -100;
+  map.high = map.and_high = 100;
+  map.count = 1;  // cos(pi u), cos(pi v)
+  const Term patch{"speed-by-position",
+                   {{Target::kGain, Basis{{map}}}, {Target::kAhead, Basis{{map}}}},
+                   Eigen::Vector4d(0.1, -0.3, 0.8, 0.6),
+                   Eigen::Vector4d::Ones()};
+  EXPECT_EQ(main_part(patch).blocks.front().target, Target::kGain);
+  const Dictionary with = dictionary_of(extent, {patch});
+  EXPECT_TRUE(std::any_of(with.hypotheses.begin(), with.hypotheses.end(),
+                          [](const Hypothesis& h) { return h.name == "speed-by-robot-and-position"; }));
 }
 
 TEST(History, ADriftOverTimeOrPlaceHasAConstantPart) {
