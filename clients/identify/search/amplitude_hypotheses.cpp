@@ -115,14 +115,17 @@ void of_known_and_more(DictionaryBuilder& make, const Extent& extent, const Targ
     put_in_order(name, words);
     for (const Eigen::Index size : sizes) make.add(group, name, words, some(bases, 0, size), choices);
   };
-  beside("time", over(Shape::kCosines, Covariate::kTime, 0, extent.duration_s, 6), {1, 2, 6});
+  // As many cosines over time as over motor time, or the latter would win at a step by its resolution.
+  constexpr std::uint32_t kMostCosines = 16;
+  beside("time", over(Shape::kCosines, Covariate::kTime, 0, extent.duration_s, kMostCosines),
+         {1, 2, 6, kMostCosines});
   beside("position", plane(extent, 3), {1, 2, 9});
   beside("heading", over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 2), {2, 4});
   // Motor time and time rise together. Unless the data tell them apart, time is the simpler one.
   constexpr double kLikeTime = 20;
   if (extent.has_stop)
-    beside("motor_time", over(Shape::kCosines, Covariate::kMotorTimeSum, 0, extent.sum_s, 16), {1, 2, 6, 16},
-           kLikeTime);
+    beside("motor_time", over(Shape::kCosines, Covariate::kMotorTimeSum, 0, extent.sum_s, kMostCosines),
+           {1, 2, 6, kMostCosines}, kLikeTime);
   Factor since = over(Shape::kCosines, Covariate::kSinceCommand, 0, extent.since_s, 5);
   since.warp = 1;
   beside("time_since_command", since, {1, 2, 5});

@@ -11,7 +11,7 @@ namespace kilotwin::identify {
 /// The functions whose product a term is, with their present values: one factor with known coefficients per covariate. Blocks of
 /// further targets do not count. Empty: the term is a constant, or no such product.
 [[nodiscard]] std::vector<Factor> functions_of(const Term&);
-/// The blocks of a term on the gain where its coefficients are largest: of both wheels, or of one. What acts beside it, as a turn rate,
+/// The blocks of a term on the gain where its coefficients are largest: of both wheels, or of one. A part beside it, as a turn rate,
 /// has other units and does not count. Of a term that acts on no gain first all.
 [[nodiscard]] Term main_part(const Term&);
 
