@@ -163,6 +163,7 @@ TEST(History, AnEffectOfPositionIsAlsoTestedOverTime) {
   ASSERT_NE(last_of("speed-by-time-and-position"), with.hypotheses.rend());
   const Hypothesis& last = *last_of("speed-by-time-and-position");
   EXPECT_EQ(last.covariates, (std::vector<std::string>{"time", "position"}));
+  EXPECT_EQ(last.columns.size(), 16U);
   const Term term = with.term_of(last, 1);
   ASSERT_EQ(term.blocks.size(), 1u);
   std::array<double, kMostColumns> values;
