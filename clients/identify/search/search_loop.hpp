@@ -76,8 +76,8 @@ class SearchLoop {
   [[nodiscard]] std::string limit() const;
   /// Tests all hypotheses and adds the one with the most evidence that fits. Returns whether there is one.
   bool accept_hypothesis(Tail);
-  /// Adds a hypothesis that passed. Returns false, with the state as before, if the likelihood
-  /// does not rise by a part of the predicted gain.
+  /// Adds a hypothesis that passed. Returns false, with the state as before, if the likelihood does not rise by kLeastRise. The predicted
+  /// gain is no bound: it is linear, and far off along directions that the model nearly contains.
   bool accepted(const Finding& best, const ScoreTest::Outcome& outcome, Tail);
   /// A lag that was fitted before a term may have been off: refits it, and takes out what it explains then.
   void refit_lag();
