@@ -165,11 +165,12 @@ std::optional<StallEffect> find_stalls(const Fitter& fitter, FitState& state) {
   out.gain = found.gain;
   out.degrees = kDegrees + (out.stalls.gain > 0 ? 1 : 0);
   out.log10_p = stats::log10_chi_squared_tail(2 * std::max(0.0, out.gain), out.degrees);
-  std::tie(out.held_out, out.held_out_se) = cross_validated(scan, found, trial);
-  if (scan.dispersion(found) > kMostDispersion || scan.share_at_obstacles(found, trial.model) > kMostAtObstacles)
+  if (out.spells < kFewestSpells || !(out.log10_p < kStallThreshold_log10_p) ||
+      scan.dispersion(found) > kMostDispersion || scan.share_at_obstacles(found, trial.model) > kMostAtObstacles)
     return std::nullopt;
-  if (out.spells < kFewestSpells || !(out.log10_p < kStallThreshold_log10_p) || !(out.held_out > kLeastStallGain) ||
-      !(out.held_out > kLeastStallErrors * out.held_out_se))
+  // Last, since it costs a scan of its own.
+  std::tie(out.held_out, out.held_out_se) = cross_validated(scan, found, trial);
+  if (!(out.held_out > kLeastStallGain) || !(out.held_out > kLeastStallErrors * out.held_out_se))
     return std::nullopt;
   const SpellScan::Intervals intervals = scan.intervals(found, out.stalls);
   out.mean_apart_s = intervals.mean_apart_s;

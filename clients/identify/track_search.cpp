@@ -43,6 +43,7 @@ FitState with_spells_of(const Fitter& fitter, const FitState& other, const FitSt
   out.model = base.model;
   out.model.stalls = other.model.stalls;
   out.scale = base.scale;
+  out.tracks.set_command_lag(base.model.base.command_lag_s);
   out.tracks.find_centres(out.model, fitter.threads());
   fitter.fit(out, 2);
   return out;

@@ -22,8 +22,8 @@ class Corrections {
   }
   void update(const Innovation& innovation, const Sample& sample) {
     const double length_s = std::exchange(length_s_, 0);
-    const bool counts = std::exchange(all_driven_, true) && !std::exchange(in_contact_, false) &&
-                        !innovation.lost && innovation.weight == 1 && length_s > 0;
+    const bool driven = std::exchange(all_driven_, true), free = !std::exchange(in_contact_, false);
+    const bool counts = driven && free && !innovation.lost && innovation.weight == 1 && length_s > 0;
     if (!counts) return;
     const Eigen::Vector3d moved = innovation.gain.topRows<3>() * innovation.difference / length_s;
     const double c = std::cos(last_.heading_rad), s = std::sin(last_.heading_rad);

@@ -77,7 +77,7 @@ class ScoreTest {
   [[nodiscard]] Finding evidence_of(const Hypothesis&, const Beside&) const;
   [[nodiscard]] Finding evidence_of(const Reduced&, const Eigen::VectorXd& scale, double log_choices) const;
 
-  const MotionModel& model_;
+  const MotionModel model_;  ///< as linearised: a search goes on while its test is in use
   const Dictionary& dictionary_;
   std::uint32_t threads_;
   Eigen::Index own_;  ///< number of columns of base parameters and terms

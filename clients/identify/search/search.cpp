@@ -29,6 +29,7 @@ SearchLoop::SearchLoop(const Fitter& fitter, const FitState& base, const WorkLog
       log_(log),
       leaves_much_(leaves_much),
       extent_(extent_of(base.tracks)),
+      worked_before_(base.tracks.work()),
       out_{base, {}, {{base, {}}}, {}, {}, {}, {}} {
   base_likelihood_ = fitter.log_likelihood_of_all(base);
 }
@@ -77,7 +78,7 @@ bool SearchLoop::accept_hypothesis(Tail tail) {
   return false;
 }
 
-bool SearchLoop::worked_out() const { return out_.fit.tracks.work() >= kMostWork; }
+bool SearchLoop::worked_out() const { return out_.fit.tracks.work() - worked_before_ >= kMostWork; }
 
 std::string SearchLoop::limit() const {
   if (worked_out()) return "The search ended at its limit of work; further effects may be in these data.";

@@ -117,12 +117,10 @@ bool SearchLoop::fits_better(std::size_t place, const Contender& other, double m
   if (of_other < own + margin) return false;
   // The term may be far from its own maximum.
   settle(place);
-  const double own_settled = evidence();
-  if (of_other > own_settled + margin) {
+  if (of_other > evidence() + margin) {
     out_ = std::move(contender);
     return true;
   }
-  if (own_settled < own) out_ = before;
   return false;
 }
 

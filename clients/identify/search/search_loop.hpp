@@ -186,7 +186,7 @@ class SearchLoop {
   /// the state if the likelihood falls.
   bool exchanged_for(std::size_t place, const Contender& other);
   /// The same if the evidence of the settled model is larger by `margin` than that of the present one, settled too. Otherwise the term
-  /// stays.
+  /// stays, settled.
   bool fits_better(std::size_t place, const Contender& other, double margin);
   /// Refines the shape of a term, and fits everything until it settles.
   void settle(std::size_t place);
@@ -221,7 +221,8 @@ class SearchLoop {
   const std::function<bool(const FitState&)>& leaves_much_;
   std::vector<Dictionary> general_;  ///< empty: not needed yet
   const Extent extent_;
-  Dictionary dictionary_;  ///< hypotheses in addition to the model
+  const std::uint64_t worked_before_;  ///< PreparedSet::work at its start: a second search has a limit of its own
+  Dictionary dictionary_;              ///< hypotheses in addition to the model
   std::optional<ScoreTest> score_test_;
   Search out_;
   double base_likelihood_ = 0;
