@@ -133,6 +133,18 @@ TEST(History, AKnownCurveIsTheSumOfItsColumns) {
   }
 }
 
+/// The columns cos(pi u) and cos(pi v) of an arena of 200 mm.
+Factor map_of_plane() {
+  Factor map;
+  map.shape = Factor::Shape::kCosines2;
+  map.axis.of = Covariate::kX;
+  map.and_axis.of = Covariate::kY;
+  map.low = map.and_low = -100;
+  map.high = map.and_high = 100;
+  map.count = 1;
+  return map;
+}
+
 TEST(History, AnEffectOfPositionIsAlsoTestedOverTime) {
   Extent extent;
   extent.duration_s = 200;
@@ -140,13 +152,7 @@ TEST(History, AnEffectOfPositionIsAlsoTestedOverTime) {
   extent.x_high_mm = extent.y_high_mm = 100;
   extent.has_straight = true;
   extent.robots = {1};
-  Factor map;
-  map.shape = Factor::Shape::kCosines2;
-  map.axis.of = Covariate::kX;
-  map.and_axis.of = Covariate::kY;
-  map.low = map.and_low = -100;
-  map.high = map.and_high = 100;
-  map.count = 1;  // cos(pi u), cos(pi v)
+  const Factor map = map_of_plane();
   Term patch;
   patch.name = "speed-by-position";
   patch.blocks = {{Target::kGain, Basis{{map}}}};
@@ -184,13 +190,7 @@ TEST(History, WhatActsBesideAGainDoesNotHideIt) {
   extent.robots = {3, 5, 9};
   extent.x_low_mm = extent.y_low_mm = -100;
   extent.x_high_mm = extent.y_high_mm = 100;
-  Factor map;
-  map.shape = Factor::Shape::kCosines2;
-  map.axis.of = Covariate::kX;
-  map.and_axis.of = Covariate::kY;
-  map.low = map.and_low = -100;
-  map.high = map.and_high = 100;
-  map.count = 1;  // cos(pi u), cos(pi v)
+  const Factor map = map_of_plane();
   const Term patch{"speed-by-position",
                    {{Target::kGain, Basis{{map}}}, {Target::kAhead, Basis{{map}}}},
                    Eigen::Vector4d(0.1, -0.3, 0.8, 0.6),
