@@ -7,6 +7,7 @@
 #include "clients/identify/search/product_functions.hpp"
 #include "clients/identify/search/products.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
+#include "clients/identify/search/target_extension.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -112,6 +113,21 @@ Term main_part(const Term& term) {
                             return a.term.coefficients.norm() < b.term.coefficients.norm();
                           })
       ->term;
+}
+
+bool is_part_of_product(const Term& part, const Term& product) {
+  const std::vector<Factor> all = functions_of(product), own = functions_of(main_part(part));
+  if (all.size() < 2 || own.empty() || main_part(part).blocks.front().target != product.blocks.front().target)
+    return false;
+  return std::all_of(own.begin(), own.end(), [&](const Factor& f) {
+    return std::any_of(all.begin(), all.end(), [&](const Factor& g) { return f.axis == g.axis; });
+  });
+}
+
+void refit_product(const Fitter& fitter, FitState& state, std::size_t place) {
+  ProductFit product(fitter, state, place, functions_of(state.model.terms[place]));
+  product.fit();
+  extend_targets(fitter, state, place);
 }
 
 bool separate(const Fitter& fitter, FitState& state, std::size_t place) {

@@ -57,6 +57,12 @@ class ProductFit {
 /// several targets, as a drift, gets an amplitude per target. Returns whether it did.
 bool separate(const Fitter&, FitState&, std::size_t term);
 
+/// Whether each function of a term is over the covariate of a function of a product on the same target: without the part, that function
+/// of the product takes its share.
+[[nodiscard]] bool is_part_of_product(const Term& part, const Term& product);
+/// Fits all functions of a product anew, and then lets it act on related targets (target_extension.hpp).
+void refit_product(const Fitter&, FitState&, std::size_t term);
+
 /// Fits the tables of all products anew, with a value for each robot of the tracks: of a model that was fitted to a part of them. A
 /// product that becomes less likely stays as it was.
 void refit_tables(const Fitter&, FitState&);

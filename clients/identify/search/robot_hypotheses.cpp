@@ -17,9 +17,11 @@ void add_robot_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   // Robots; with more, only the gains above are tried. A larger value costs a column per robot in each of the hypotheses below.
   constexpr std::size_t kMostForAll = 40;
   if (keys.size() > kMostForAll) return;
-  const auto slopes = make.put(kSpeed, Basis{{keyed(Shape::kTable, Covariate::kRobot, keys),
-                                              over(Shape::kLinear, Covariate::kTime, 0, extent.duration_s, 1)}});
-  make.add(kSpeed, "robot-and-time", {"robot", "time"}, some(slopes, 0, n));
+  // Of each wheel pair: robots that tire, and robots whose bias changes or that are replaced.
+  const Basis slopes{{keyed(Shape::kTable, Covariate::kRobot, keys),
+                      over(Shape::kLinear, Covariate::kTime, 0, extent.duration_s, 1)}};
+  for (const TargetGroup* group : {&kSpeed, &kTurning})
+    make.add(*group, "robot-and-time", {"robot", "time"}, some(make.put(*group, slopes), 0, n));
   // A bent leg, a rotated marker.
   const Basis each{{keyed(Shape::kTable, Covariate::kRobot, keys)}};
   make.add(kSlip, "robot", {"robot"}, some(make.put(kSlip, each), 0, n));

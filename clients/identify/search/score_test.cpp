@@ -119,6 +119,7 @@ struct ScoreTest::Beside {
     Eigen::VectorXd score;               ///< of all columns, without the term
   };
   std::vector<Eigen::Index> columns;
+  Eigen::VectorXd prior, pull;          ///< the precision of their prior, and its gradient
   Eigen::LDLT<Eigen::MatrixXd> solver;  ///< of their information and prior
   std::vector<Fold> by_unit, by_cluster;
 };
@@ -187,6 +188,7 @@ ScoreTest::ScoreTest(const Fitter& fitter, const MotionModel& model, const std::
     first += n;
   }
   score_ += from;
+  pull_ = from.head(own_);
 }
 
 ScoreTest::Beside ScoreTest::beside(int without_term) const {
@@ -203,8 +205,10 @@ ScoreTest::Beside ScoreTest::beside(int without_term) const {
     }
     first += n;
   }
+  out.prior = prior_(out.columns);
+  out.pull = pull_(out.columns);
   Eigen::MatrixXd own = information_(out.columns, out.columns);
-  own.diagonal() += prior_(out.columns);
+  own.diagonal() += out.prior;
   out.solver.compute(own);
   for (const bool by_cluster : {false, true}) {
     const Folds& folds = by_cluster ? by_cluster_ : by_unit_;
@@ -220,14 +224,14 @@ ScoreTest::Beside ScoreTest::beside(int without_term) const {
   return out;
 }
 
-/// Information and score of columns, reduced by those beside them, for all folds.
+/// Information and score of columns, reduced by those beside them, which give way to them against their prior: of all
+/// measurements with that prior, and of each fold, which does not contain it.
 ScoreTest::Reduced ScoreTest::reduce(const std::vector<Eigen::Index>& columns, const Beside& beside,
                                      bool by_cluster) const {
   const Eigen::MatrixXd by = beside.solver.solve(information_(beside.columns, columns));
   Reduced out;
-  out.information =
-      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(columns.size()), static_cast<Eigen::Index>(columns.size()));
-  out.score = Eigen::VectorXd::Zero(out.information.rows());
+  out.information = by.transpose() * beside.prior.asDiagonal() * by;
+  out.score = -by.transpose() * beside.pull;
   for (const Beside::Fold& fold : by_cluster ? beside.by_cluster : beside.by_unit) {
     const Eigen::MatrixXd part = (*fold.information)(beside.columns, columns);
     Eigen::MatrixXd information = (*fold.information)(columns, columns);

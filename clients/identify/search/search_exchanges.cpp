@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "clients/identify/search/amplitudes.hpp"
@@ -32,7 +33,7 @@ bool SearchLoop::eliminate() {
   for (int t = 0; t < static_cast<int>(out_.fit.model.terms.size()) && !worked_out(); ++t) {
     const auto place = static_cast<std::size_t>(t);
     const Finding own = score_test_->evidence_of_term(t);
-    if (own.held_out < 2 && removed(place, false)) return true;
+    if ((own.held_out < 2 || product_with(place)) && removed(place, false)) return true;
     if (exchanged(place, own)) return true;
   }
   return false;
@@ -199,13 +200,25 @@ void SearchLoop::eliminate_earlier() {
   }
 }
 
+std::optional<std::size_t> SearchLoop::product_with(std::size_t part) const {
+  const std::vector<Term>& terms = out_.fit.model.terms;
+  for (std::size_t t = 0; t < terms.size(); ++t)
+    if (t != part && is_part_of_product(terms[part], terms[t])) return t;
+  return std::nullopt;
+}
+
 bool SearchLoop::removed(std::size_t t, bool shape_last) {
   const Search before = out_;
   const double evidence = fitter_.log_evidence(out_.fit);
+  std::optional<std::size_t> product = product_with(t);
+  if (product && *product > t) --*product;
   out_.fit.model.terms.erase(out_.fit.model.terms.begin() + static_cast<std::ptrdiff_t>(t));
   out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(t));
   fitter_.fit(out_.fit, shape_last ? 2 : 1);
-  if (shape_last) refine_shape(out_.fit.model.terms.size() - 1);
+  if (product)
+    refit_product(fitter_, out_.fit, *product);
+  else if (shape_last)
+    refine_shape(out_.fit.model.terms.size() - 1);
   if (fitter_.log_evidence(out_.fit) > evidence - kClose) return true;
   out_ = before;
   return false;

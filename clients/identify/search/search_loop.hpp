@@ -200,7 +200,10 @@ class SearchLoop {
   /// A new effect may explain what earlier terms were accepted for, unless it has far less evidence. Tries to
   /// remove each earlier term, with the shape of the new one refined.
   void eliminate_earlier();
-  /// Removes a term unless the evidence falls.
+  /// The product that could take the share of a term over some of its covariates.
+  [[nodiscard]] std::optional<std::size_t> product_with(std::size_t part) const;
+  /// Removes a term unless the evidence falls. The product that takes its share is fitted anew, or the shape of the last term
+  /// refined.
   bool removed(std::size_t t, bool shape_last);
   void note_alternatives(const Finding& best, const ScoreTest::Outcome& outcome);
   /// Whether an alternative to the last accepted effect, which is now significant beside it, has more evidence in

@@ -201,6 +201,28 @@ TEST(History, WhatActsBesideAGainDoesNotHideIt) {
                           [](const Hypothesis& h) { return h.name == "speed-by-robot-and-position"; }));
 }
 
+TEST(History, AMapOrACurveIsAPartOfTheirProduct) {
+  Factor map = map_of_plane(), curve;
+  curve.shape = Factor::Shape::kCosines;
+  curve.axis.of = Covariate::kTime;
+  curve.high = 100;
+  curve.count = 2;
+  const auto of = [](Target target, const std::vector<Factor>& factors, const Eigen::VectorXd& coefficients) {
+    return Term{"", {{target, Basis{factors}}}, coefficients, Eigen::VectorXd::Ones(coefficients.size())};
+  };
+  const Term of_place = of(Target::kGain, {map}, Eigen::Vector2d(0.1, -0.3)),
+             of_time = of(Target::kGain, {curve}, Eigen::Vector2d(0.1, -0.3)),
+             turn = of(Target::kTurn, {curve}, Eigen::Vector2d(0.1, -0.3));
+  Factor known = curve;
+  known.known = {0.2, 0.4};
+  const Term product = of(Target::kGain, {known, map}, Eigen::Vector2d(1, -1));
+  EXPECT_TRUE(is_part_of_product(of_place, product));
+  EXPECT_TRUE(is_part_of_product(of_time, product));
+  EXPECT_FALSE(is_part_of_product(turn, product));
+  EXPECT_FALSE(is_part_of_product(product, of_place));
+  EXPECT_FALSE(is_part_of_product(of_place, of_time));
+}
+
 TEST(History, ADriftOverTimeOrPlaceHasAConstantPart) {
   Extent extent;
   extent.has_straight = true;
