@@ -3,6 +3,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "clients/identify/search/change_points.hpp"
 #include "clients/identify/search/products.hpp"
@@ -25,6 +26,15 @@ struct Summand {
     std::array<double, kMostColumns> values;
     basis.evaluate(s, 0, values.data());
     return coefficients.dot(Eigen::Map<const Eigen::VectorXd>(values.data(), coefficients.size()));
+  }
+  /// At a value of its only covariate.
+  [[nodiscard]] double of(double value, std::array<double, kMostColumns>& columns) const {
+    if (open == nullptr) return coefficients[0];
+    open->evaluate_at(value, 0, columns.data());
+    double sum = 0;
+    for (std::size_t i = 0; i < basis.size(); ++i)
+      sum += coefficients[static_cast<Eigen::Index>(i)] * columns[basis.chosen.empty() ? i : basis.chosen[i]];
+    return sum;
   }
 };
 
@@ -49,6 +59,38 @@ std::vector<Summand> summands_of(const Term& term) {
     all.push_back(std::move(one));
   }
   return all;
+}
+
+/// A sum of curves over one covariate, as a smooth one and its sudden changes, as cosines. Nothing if they do not share it, or if none
+/// is of cosines.
+std::optional<Factor> projected(const std::vector<Summand>& summands, Target target) {
+  constexpr std::uint32_t kCosines = 64;  // as many as a curve over time has
+  constexpr int kSamples = 8 * kCosines;  // midpoints, at which different cosines are orthogonal
+  const Factor* curve = nullptr;
+  for (const Summand& one : summands)
+    if (one.open != nullptr && one.open->shape == Shape::kCosines) curve = one.open;
+  if (curve == nullptr) return std::nullopt;
+  for (const Summand& one : summands)
+    if (one.open != nullptr && (one.open->of_two() || !(one.open->axis == curve->axis))) return std::nullopt;
+  Factor sum = *curve;
+  sum.first = 1;
+  sum.count = kCosines;
+  sum.warp = 0;
+  sum.known.assign(kCosines, 0);
+  std::array<double, kMostColumns> columns;
+  for (int i = 0; i < kSamples; ++i) {
+    const double u = (i + 0.5) / kSamples, at = sum.low + u * (sum.high - sum.low);
+    double total = 0, gain = 1;
+    for (const Summand& one : summands) {
+      const double own = one.of(at, columns);
+      total += own;
+      gain *= 1 + own;
+    }
+    const double value = (is_gain(target) ? gain - 1 : total) / kSamples;
+    sum.plus += value;
+    for (std::uint32_t k = 1; k <= kCosines; ++k) sum.known[k - 1] += 2 * value * std::cos(M_PI * k * u);
+  }
+  return sum;
 }
 
 /// Values of a map at nodes; nothing if the summands do not share a plane.
@@ -112,7 +154,9 @@ std::optional<Factor> function_of(const Term& term) {
     }
   }
   if (count == 0) return std::nullopt;
-  if (count > 1 || open->open->of_two()) return sampled(summands, term.blocks.front().target);
+  const Target target = term.blocks.front().target;
+  if (count > 1 && !is_of_place(*open->open)) return projected(summands, target);
+  if (count > 1 || open->open->of_two()) return sampled(summands, target);
   Factor function = *open->open;
   function.known.assign(function.columns(), 0);
   for (std::size_t i = 0; i < open->basis.size(); ++i)

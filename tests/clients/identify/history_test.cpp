@@ -201,6 +201,31 @@ TEST(History, WhatActsBesideAGainDoesNotHideIt) {
                           [](const Hypothesis& h) { return h.name == "speed-by-robot-and-position"; }));
 }
 
+TEST(History, ACurveAndItsSuddenChangesAreOneFunction) {
+  Factor curve, step;
+  curve.shape = Factor::Shape::kCosines;
+  step.shape = Factor::Shape::kAtLeast;
+  curve.axis.of = step.axis.of = Covariate::kTime;
+  curve.high = 150;
+  curve.count = 3;
+  step.points = {64.6};
+  const Term term{"speed-by-time",
+                  {{Target::kGain, Basis{{curve}, {0, 2}}}, {Target::kGain, Basis{{step}}}},
+                  Eigen::Vector3d(0.1, -0.05, 0.4),
+                  Eigen::Vector3d::Ones()};
+  const std::vector<Factor> functions = functions_of(term);
+  ASSERT_EQ(functions.size(), 1U);
+  EXPECT_EQ(functions.front().axis, curve.axis);
+  for (double time_s = 0.5; time_s < 150; time_s += 1) {
+    // Cosines round off the step.
+    if (std::abs(time_s - 64.6) < 15) continue;
+    const double u = time_s / 150, smooth = 0.1 * std::cos(M_PI * u) - 0.05 * std::cos(3 * M_PI * u);
+    double found = 0;
+    functions.front().evaluate_at(time_s, 0, &found);
+    EXPECT_NEAR(found, (1 + smooth) * (time_s < 64.6 ? 1 : 1.4) - 1, 0.03) << time_s;
+  }
+}
+
 TEST(History, AMapOrACurveIsAPartOfTheirProduct) {
   Factor map = map_of_plane(), curve;
   curve.shape = Factor::Shape::kCosines;
