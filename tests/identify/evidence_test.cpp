@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "clients/identify/fit/linearisation.hpp"
@@ -90,6 +91,20 @@ TEST(Evidence, OfAHypothesisIsThatOfTheModelWithItsColumns) {
 
 TEST(Evidence, OfRobotsWhoseBiasChangesNeedsNoGeneralTerm) {
   EXPECT_EQ(found_in(small({truth::replaced_robots()})), "bias-by-robot-and-time");
+}
+
+TEST(Evidence, TellsMotorTimeFromTimeInAProduct) {
+  truth::Effect wear;
+  wear.name = "wear";
+  wear.push = [](const truth::Situation& at, truth::Push& push) {
+    const double d2 = (std::pow(at.disc.x - 60, 2) + std::pow(at.disc.y - 40, 2)) / (200.0 * 200.0);
+    const double gain = 1 - 0.5 * std::min(1.0, (at.driven_s.left + at.driven_s.right) / 200) / (1 + d2 * d2);
+    push.gain.left *= gain;
+    push.gain.right *= gain;
+  };
+  truth::Scene scene = small({wear});
+  scene.train_s = 150;
+  EXPECT_EQ(found_in(scene), "speed-by-motor-time-and-position");
 }
 
 TEST(Evidence, APartOfAProductIsTakenIntoIt) {

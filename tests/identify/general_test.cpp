@@ -234,6 +234,8 @@ std::map<int, Switch> switches_of(const truth::Effect& effect) {
   fitter.fit(state, 2);
   identify::refine_curves(fitter, state, 0);
   if (!identify::simplify_to_switch(fitter, state, 0)) return {};
+  // Later refinements leave them their instants.
+  identify::refine_curves(fitter, state, 0);
   std::map<int, Switch> switches;
   const identify::Term& term = state.model.terms.front();
   Eigen::Index column = 0;

@@ -33,6 +33,8 @@ Block stepping(const Block& like, const std::vector<double>& points) {
   Factor f;
   f.shape = Shape::kAtLeast;
   f.axis = curve.axis;
+  f.low = curve.low;
+  f.high = curve.high;
   f.points = points;
   curve = f;
   return block;

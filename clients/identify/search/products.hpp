@@ -63,6 +63,10 @@ bool separate(const Fitter&, FitState&, std::size_t term);
 /// Fits all functions of a product anew, and then lets it act on related targets (target_extension.hpp).
 void refit_product(const Fitter&, FitState&, std::size_t term);
 
+/// Run time and motor-on time rise together, and one may stand for the other until all effects are found: puts the other one into a
+/// product that has one of them (product_clock.cpp), if the evidence is larger. Returns whether it was.
+[[nodiscard]] bool exchange_clock(const Fitter&, FitState&, std::size_t term);
+
 /// Fits the tables of all products anew, with a value for each robot of the tracks: of a model that was fitted to a part of them. A
 /// product that becomes less likely stays as it was.
 void refit_tables(const Fitter&, FitState&);

@@ -37,6 +37,7 @@ SearchLoop::SearchLoop(const Fitter& fitter, const FitState& base, const WorkLog
 Search SearchLoop::run() {
   while (changed()) {
     ++round_;
+    exchange_clocks();
     note_stage();
   }
   for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t) {
@@ -163,13 +164,17 @@ bool SearchLoop::lag_explains(const Finding& best) {
   // clock to effects; a smaller one takes effects for a clock.
   constexpr double kMost = 0.8;
   if (fitter_.fit_command_lag(out_.fit, kMost * best.evidence) == 0) return false;
-  if (out_.reasons.empty() || starts_anew_) return true;
   // Effects that were found beside a wrong clock may be its artefacts: the search starts anew.
-  FitState anew = out_.path.front().fit;
-  if (fitter_.fit_command_lag(anew) == 0) return true;
-  starts_anew_ = true;
-  out_ = {std::move(anew), {}, {out_.path.front()}, {}, {}, {}, {}};
-  failed_.clear();
+  if (!out_.reasons.empty() && !std::exchange(starts_anew_, true)) {
+    FitState anew = out_.path.front().fit;
+    if (fitter_.fit_command_lag(anew) == 0) return true;
+    out_ = {std::move(anew), {}, {out_.path.front()}, {}, {}, {}, {}};
+    failed_.clear();
+    alternatives_ = {};
+    round_ = failures_ = eliminations_ = general_terms_ = 0;
+  }
+  // The gain of a lag is none of effects.
+  if (out_.reasons.empty()) base_likelihood_ = fitter_.log_likelihood_of_all(out_.fit);
   return true;
 }
 

@@ -39,6 +39,26 @@ bool SearchLoop::eliminate() {
   return false;
 }
 
+void SearchLoop::exchange_clocks() {
+  Attempt attempt{Attempt::Kind::kClock, {}};
+  for (const Term& term : out_.fit.model.terms) attempt.names.push_back(term.name);
+  if (worked_out() || !failed_.insert(attempt).second) return;
+  for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t) {
+    const std::string before = out_.fit.model.terms[t].name;
+    if (!exchange_clock(fitter_, out_.fit, t)) continue;
+    std::string from = "motor-time", to = "time";
+    if (before.find(from) == std::string::npos) std::swap(from, to);
+    std::string& name = out_.fit.model.terms[t].name;
+    if (const std::size_t at = before.find(from); at != std::string::npos) name.replace(at, from.size(), to);
+    std::replace(from.begin(), from.end(), '-', '_');
+    std::replace(to.begin(), to.end(), '-', '_');
+    std::vector<std::string>& covariates = out_.reasons[t].covariates;
+    std::replace(covariates.begin(), covariates.end(), from, to);
+    out_.note_renamed(before, name);
+    fitter_.fit_contacts(out_.fit);
+  }
+}
+
 bool SearchLoop::exchanged(std::size_t place, const Finding& own) {
   const std::string name = out_.fit.model.terms[place].name;  // the term may change below
   std::vector<const Hypothesis*> others;

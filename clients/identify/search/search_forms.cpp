@@ -28,8 +28,8 @@ bool is_of_place(const Axis& axis) {
 
 }  // namespace
 
-void SearchLoop::add_candidates(const Dictionary& family, bool general, double least_evidence, Candidates& best,
-                                Tail tail, bool screening) {
+void SearchLoop::add_candidates(const Dictionary& family, Attempt::Kind kind, double least_evidence,
+                                Candidates& best, Tail tail, bool screening) {
   std::vector<Block> blocks = blocks_of(out_.fit.model);
   blocks.insert(blocks.end(), family.blocks.begin(), family.blocks.end());
   const ColumnGroups read = columns_read_by_test(out_.fit.model, family);
@@ -40,33 +40,32 @@ void SearchLoop::add_candidates(const Dictionary& family, bool general, double l
   const ScoreTest::Outcome outcome = test.test(kSeed + 100 + static_cast<std::uint64_t>(round_), tail);
   for (const Finding& f : outcome.findings) {
     const Hypothesis& h = family.hypotheses[f.hypothesis];
-    const Attempt attempt{general ? Attempt::Kind::kGeneral : Attempt::Kind::kForm, {h.name}, tail};
+    const Attempt attempt{kind, {h.name}, tail};
     const auto known = best.find(attempt);
     if (!(screening ? clear(f, outcome.threshold_log10_p) : good(f, outcome.threshold_log10_p)) ||
         f.evidence < least_evidence || failed_.contains(attempt) ||
         (known != best.end() && f.evidence <= known->second.reason.finding.evidence))
       continue;
-    GeneralTerm one{family.term_of(h, f.relative_scale), {h.covariates, h.acts_on, f, outcome.threshold_log10_p}};
-    one.term.general = general;
+    GeneralTerm one{
+        attempt, family.term_of(h, f.relative_scale), {h.covariates, h.acts_on, f, outcome.threshold_log10_p}};
+    one.term.general = kind == Attempt::Kind::kGeneral;
     best.insert_or_assign(attempt, std::move(one));
   }
 }
 
 std::vector<SearchLoop::GeneralTerm> SearchLoop::general_candidates(Tail tail, bool screening) {
   if (general_.empty()) general_ = general_dictionaries_of(extent_);
-  std::vector<Dictionary> families = general_;
-  if (!screening) {
-    if (Dictionary waves = wave_dictionary_of(fitter_, out_.fit, extent_); !waves.hypotheses.empty())
-      families.push_back(std::move(waves));
-    const std::vector<MovingCircle> circles = moving_circles_of(fitter_, out_.fit, extent_);
-    if (!circles.empty()) families.push_back(dictionary_of_circles(out_.fit, extent_, circles));
-  }
   Candidates best;
   const double least = kRemnant * explained();
-  for (const Dictionary& family : families) {
-    // Waves and moving circles have a form of their own, with a name.
-    const bool general = static_cast<std::size_t>(&family - families.data()) < general_.size();
-    add_candidates(family, general, least, best, tail, screening);
+  for (const Dictionary& family : general_)
+    add_candidates(family, Attempt::Kind::kGeneral, least, best, tail, screening);
+  if (!screening) {
+    const Dictionary waves = wave_dictionary_of(fitter_, out_.fit, extent_);
+    if (!waves.hypotheses.empty()) add_candidates(waves, Attempt::Kind::kWaveForm, least, best, tail);
+    const std::vector<MovingCircle> circles = moving_circles_of(fitter_, out_.fit, extent_);
+    if (!circles.empty())
+      add_candidates(dictionary_of_circles(out_.fit, extent_, circles), Attempt::Kind::kCircleForm, least, best,
+                     tail);
   }
   std::vector<GeneralTerm> ranked;
   for (auto& [attempt, one] : best) ranked.push_back(std::move(one));
@@ -104,7 +103,7 @@ bool SearchLoop::accept_wave(double evidence) {
   const Dictionary waves = wave_dictionary_of(fitter_, out_.fit, extent_);
   if (waves.hypotheses.empty()) return false;
   Candidates best;
-  add_candidates(waves, false, evidence, best);
+  add_candidates(waves, Attempt::Kind::kWaveForm, evidence, best);
   if (best.empty()) return false;
   GeneralTerm& wave = best.begin()->second;
   const std::vector<double>& numbers = wave.term.blocks.front().basis.factors.front().points;
@@ -164,7 +163,8 @@ bool SearchLoop::accept_moving_circle(bool alone) {
   const std::vector<MovingCircle> circles = moving_circles_of(fitter_, out_.fit, extent_);
   if (!circles.empty() && circles.front().gain > least_share * explained) {
     Candidates best;
-    add_candidates(dictionary_of_circles(out_.fit, extent_, circles), false, least_share * explained, best);
+    add_candidates(dictionary_of_circles(out_.fit, extent_, circles), Attempt::Kind::kCircleForm,
+                   least_share * explained, best);
     if (!best.empty() && fits(std::move(best.begin()->second), attempt) &&
         fitter_.log_evidence(out_.fit) > evidence + kClose && !(alone && leaves_hypothesis())) {
       Search circle = std::exchange(out_, before);
@@ -237,13 +237,14 @@ double SearchLoop::evidence_of_product(std::size_t of_place, std::size_t rising,
 bool SearchLoop::accept_further_circle() {
   // Chance finds circles with a smaller gain in most sets.
   constexpr double kLeastGain = 30;
-  const Attempt attempt{Attempt::Kind::kForm, {"speed-by-position-and-time"}};
+  const Attempt attempt{Attempt::Kind::kCircleForm, {"speed-by-position-and-time"}};
   if (!limit().empty() || failed_.contains(attempt)) return false;
   say(kAlternatives, "testing moving circles");
   const std::vector<MovingCircle> circles = moving_circles_of(fitter_, out_.fit, extent_);
   if (circles.empty() || circles.front().gain < kLeastGain) return false;
   Candidates best;
-  add_candidates(dictionary_of_circles(out_.fit, extent_, circles), false, kRemnant * explained(), best);
+  add_candidates(dictionary_of_circles(out_.fit, extent_, circles), Attempt::Kind::kCircleForm,
+                 kRemnant * explained(), best);
   return !best.empty() && fits(std::move(best.begin()->second), attempt);
 }
 
@@ -252,7 +253,7 @@ bool SearchLoop::accept_general(Tail tail) {
   say(kGeneralTerms, "testing general terms");
   for (GeneralTerm& one : general_candidates(tail, !leaves_much_(out_.fit))) {
     if (worked_out()) break;
-    const Attempt attempt{one.term.general ? Attempt::Kind::kGeneral : Attempt::Kind::kForm, {one.term.name}, tail};
+    const Attempt attempt = one.attempt;
     if (!fits(std::move(one), attempt)) continue;
     ++general_terms_;
     --eliminations_;

@@ -22,12 +22,14 @@ namespace kilotwin::identify {
 struct Attempt {
   enum class Kind : std::uint8_t {
     kNamed,       ///< a hypothesis with a named form
-    kForm,        ///< a wave or a moving circle, which may have the name of a general term
     kGeneral,     ///< a general term
+    kWaveForm,    ///< a wave among general terms, whose name it may have
+    kCircleForm,  ///< a moving circle beside other terms, with the same names
     kWave,        ///< a wave among named hypotheses
     kLoneCircle,  ///< a moving circle in place of terms, if it leaves no hypothesis
     kCircle,      ///< a moving circle in place of terms
-    kExchange     ///< the first hypothesis in place of a term, the second
+    kExchange,    ///< the first hypothesis in place of a term, the second
+    kClock        ///< another clock in the products among these terms
   };
   Kind kind;
   std::vector<std::string> names;
@@ -54,8 +56,9 @@ class SearchLoop {
   /// Largest number of samples in the test. More add cost and no power that is needed.
   static constexpr std::size_t kEnoughSamples = 130000;
 
-  /// A general term that passed, with its reason.
+  /// A general term, a wave or a circle that passed, with its reason.
   struct GeneralTerm {
+    Attempt attempt;
     Term term;
     Reason reason;
   };
@@ -134,7 +137,7 @@ class SearchLoop {
 
   /// Adds the hypotheses of a family that pass the tests, of each name the one with the most evidence, by kind and name. `screening`:
   /// only clear ones.
-  void add_candidates(const Dictionary& family, bool general, double least_evidence, Candidates& best,
+  void add_candidates(const Dictionary& family, Attempt::Kind, double least_evidence, Candidates& best,
                       Tail tail = Tail::kOfColumns, bool screening = false);
   /// Those of all families, in the order of their evidence. `screening`: only clear ones.
   std::vector<GeneralTerm> general_candidates(Tail, bool screening);
@@ -177,6 +180,8 @@ class SearchLoop {
   /// Exchanges a term, whose evidence is `own`, for a hypothesis with clearly more evidence in its place, or for one with about as much
   /// that fits better.
   bool exchanged(std::size_t place, const Finding& own);
+  /// Exchanges run time and motor-on time in products. A residual of the wrong one would pass the tests as further terms.
+  void exchange_clocks();
   /// Replaces the last term, of two covariates, by a product of two functions: its columns leave residuals that would pass the tests as one
   /// further term after another. First, another hypothesis may replace it: a product can resemble much.
   void separate_last();

@@ -61,8 +61,6 @@ Factor richer(Factor f) {
       if (f.axis.of != Covariate::kTime) break;
       // change_points.hpp finds the times of steps.
       f.shape = Shape::kCosines;
-      f.low = 0;
-      f.high = f.points.back() + f.points.front();
       f.first = 1;
       f.count = 64;
       f.points.clear();
@@ -137,6 +135,15 @@ bool is_product(const Term& term) {
          std::any_of(factors.begin(), factors.end(), [](const Factor& f) { return !f.known.empty(); });
 }
 
+/// Whether amplitudes of some keys begin at an instant (simplification.hpp). Curves in their place would lose the instants.
+bool is_switch(const Term& term) {
+  return std::all_of(term.blocks.begin(), term.blocks.end(), [](const Block& block) {
+    const std::vector<Factor>& f = block.basis.factors;
+    return f.size() == 2 && f[0].shape == Shape::kAtLeast && f[0].points.size() == 1 &&
+           f[1].shape == Shape::kTable && f[0].known.empty() && f[1].known.empty();
+  });
+}
+
 /// A single curve. Its column of frequency 0 is the constant.
 bool is_curve(const Basis& basis) {
   const Factor* const open = basis.only_open();
@@ -159,6 +166,16 @@ bool lies_beyond_map(const Block& block, const std::vector<Block>& blocks) {
          });
 }
 
+/// Whether a block holds the sudden changes of a curve (change_points.hpp). The curve then shows them, until they are found again.
+bool lies_beside_curve(const Block& block, const std::vector<Block>& blocks) {
+  const Factor* const steps = block.basis.only_open();
+  return steps != nullptr && steps->shape == Shape::kAtLeast && steps->axis.of == Covariate::kTime &&
+         std::any_of(blocks.begin(), blocks.end(), [&](const Block& other) {
+           return other.target == block.target && other.during == block.during && is_curve(other.basis) &&
+                  other.basis.only_open()->axis == steps->axis;
+         });
+}
+
 std::vector<Block> richer(const Term& term) {
   std::vector<Block> blocks;
   for (const Block& block : term.blocks) {
@@ -168,7 +185,7 @@ std::vector<Block> richer(const Term& term) {
                  is_curve(other.basis);
         }))
       continue;
-    if (lies_beyond_map(block, term.blocks)) continue;
+    if (lies_beyond_map(block, term.blocks) || lies_beside_curve(block, term.blocks)) continue;
     Block rich = block;
     rich.basis = with_chosen_keys(block.basis);
     rich.basis.chosen.clear();
@@ -399,8 +416,9 @@ void fit_smoothly(const Fitter& fitter, FitState& state, std::size_t place, cons
 }  // namespace
 
 void refine_curves(const Fitter& fitter, FitState& state, std::size_t place) {
-  if (state.model.terms[place].general || is_product(state.model.terms[place])) return refit(fitter, state, place);
-  fit_smoothly(fitter, state, place, richer(state.model.terms[place]));
+  const Term& term = state.model.terms[place];
+  if (term.general || is_product(term) || is_switch(term)) return refit(fitter, state, place);
+  fit_smoothly(fitter, state, place, richer(term));
 }
 
 void refine_to(const Fitter& fitter, FitState& state, std::size_t place, const std::vector<Block>& blocks,

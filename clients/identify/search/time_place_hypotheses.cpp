@@ -45,7 +45,9 @@ std::vector<Eigen::Index> add_time_hypotheses(DictionaryBuilder& make, const Ext
   constexpr int kSteps = 40;
   std::vector<double> at;
   for (int i = 1; i < kSteps; ++i) at.push_back(extent.duration_s * i / kSteps);
-  const Basis steps{{keyed(Shape::kAtLeast, Covariate::kTime, at)}};
+  Factor at_least = keyed(Shape::kAtLeast, Covariate::kTime, at);
+  at_least.high = extent.duration_s;
+  const Basis steps{{at_least}};
   const auto n = static_cast<Eigen::Index>(at.size());
   for (const TargetGroup* group : {&kSpeed, &kWorld}) {
     const auto bases = make.put(*group, steps);

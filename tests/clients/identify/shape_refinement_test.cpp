@@ -226,6 +226,30 @@ TEST(ChangePoints, TheTimeOfAPulseIsRecovered) {
   EXPECT_NEAR(model.terms[0].coefficients[0] * (steps.points[1] - steps.points[0]), 12, 1);
 }
 
+TEST(ShapeRefinement, StepsBecomeACurveOverTheWholeRun) {
+  // A step that was found first, at 20 s. What follows at 60 s lies beyond twice its instant.
+  TargetGroup acting;
+  acting.drift_x_mm_s = [](double t) { return (t >= 20 ? 2.0 : 0.0) - (t >= 60 ? 3.0 : 0.0); };
+  const MeasuredSet set = played(acting, 6, 8, 80);
+  const Fitter fitter(set, 2);
+  FitState state(set);
+  fitter.fit_base(state);
+  Factor step;
+  step.shape = Factor::Shape::kAtLeast;
+  step.axis.of = Covariate::kTime;
+  step.high = 80;
+  step.points = {20};
+  state.model.terms.push_back(unfitted("drift-by-time", {{Target::kWorldX, Basis{{step}}, kDriven}}));
+  fitter.fit(state, 2);
+  refine_curves(fitter, state, 0);
+  for (const auto& [time_s, drift_mm_s] : {std::pair{10.0, 0.0}, {40.0, 2.0}, {70.0, -1.0}}) {
+    Situation s;
+    s.time_s = time_s;
+    s.commands.command = Motion::kStraight;
+    EXPECT_NEAR(state.model.rates(s, {0, 0}).drift_x_mm_s, drift_mm_s, 0.4) << time_s;
+  }
+}
+
 /// A curve over the motor-on time, fitted and refined.
 void add_speed_by_motor_time(const Fitter& fitter, FitState& state, double longest_s) {
   const Basis basis{{cosines(Covariate::kMotorTime, longest_s, 8, 0)}};
