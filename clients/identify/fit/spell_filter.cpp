@@ -88,9 +88,8 @@ class SpellFilter {
       const SpellBranch stays = spell_stays(stalls_, h.spell, length_s);
       History same = h;
       const bool shown = carry(same, i, stays);
-      const bool divide = histories_.size() > 1 || h.spell.in_spell || distance2_ > kBenignForSpells;
-      if (divide && !shown) add(same, spell_changes_unseen(stalls_, h.spell, length_s));
-      if (divide && shown)
+      if (!shown) add(same, spell_changes_unseen(stalls_, h.spell, length_s));
+      if (shown && (h.spell.in_spell || distance2_ > kBenignForSpells))
         for (const SpellBranch& change : spell_changes(stalls_, h.spell, length_s)) {
           History other = h;
           carry(other, i, change);

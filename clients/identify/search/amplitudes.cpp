@@ -65,8 +65,9 @@ std::optional<std::size_t> merge_amplitudes(const Fitter& fitter, FitState& stat
   trial.model.terms.erase(trial.model.terms.begin() + static_cast<std::ptrdiff_t>(*source));
   ProductFit product(fitter, trial, trial.model.terms.size() - 1, std::move(functions));
   product.fit();
-  if (fitter.log_likelihood(trial) <= fitter.log_likelihood(state) - kLikelihoodSlack) return std::nullopt;
+  // First, parts of the other term beside its gain get back what they explain.
   extend_targets(fitter, trial, trial.model.terms.size() - 1);
+  if (fitter.log_likelihood(trial) <= fitter.log_likelihood(state) - kLikelihoodSlack) return std::nullopt;
   state = std::move(trial);
   return source;
 }

@@ -101,15 +101,15 @@ std::vector<MoveNumber> moves_of(const MovingPoint& point, double duration_s) {
   return moves;
 }
 
-/// Numbers of a circle: two of its centre, two of a velocity, one of a growth, one of an edge.
-double cost_of(const Term& term) {
+}  // namespace
+
+double cost_of_circle(const Term& term) {
+  // Two of its centre, two of a velocity, one of a growth, one of an edge.
   const Factor& f = term.blocks.front().basis.factors.front();
   const MovingPoint& p = f.axis.point;
   return kCircleNumber * (2.0 + (p.velocity_x_mm_s != 0 || p.velocity_y_mm_s != 0 ? 2 : 0) +
                           (p.growth_mm_s != 0 ? 1 : 0) + (f.shape == Shape::kAtLeast ? 1 : 0));
 }
-
-}  // namespace
 
 void settle(const Fitter& fitter, FitState& state) {
   // Fits of two passes; the loop ends earlier once the log likelihood rises by less than 1.
@@ -125,13 +125,13 @@ void settle(const Fitter& fitter, FitState& state) {
 
 void climb(const Fitter& fitter, FitState& state, std::size_t place, double first_mm,
            const std::vector<MoveNumber>& moves, std::uint64_t most_work) {
-  // Smallest move; a smaller one costs a fit per number and places edges below the tracker's noise.
+  // Smallest move; a smaller one places edges below the tracker's noise.
   constexpr double kLast_mm = 0.7;
   double likelihood = fitter.log_likelihood(state);
+  // With all parameters held: a fit for each move would cost ten times as much, and end at the same place.
   const auto moved = [&](const MoveNumber& move, double by_mm) {
     FitState trial = state;
     move(trial.model.terms[place], by_mm);
-    fitter.fit(trial, 2);
     const double found = fitter.log_likelihood(trial);
     // Negated, so that a likelihood that is no number is no progress.
     if (!(found > likelihood)) return false;
@@ -140,10 +140,16 @@ void climb(const Fitter& fitter, FitState& state, std::size_t place, double firs
     return true;
   };
   double step_mm = first_mm;
-  while (step_mm > kLast_mm) {
-    for (const MoveNumber& move : moves)
-      if (state.tracks.work() < most_work && !moved(move, step_mm)) moved(move, -step_mm);
+  while (step_mm > kLast_mm && state.tracks.work() < most_work) {
+    bool any = false;
+    for (const MoveNumber& move : moves) any = moved(move, step_mm) || moved(move, -step_mm) || any;
     step_mm /= 2;
+    if (!any) continue;
+    FitState trial = state;
+    const double found = fitter.fit_for_likelihood(trial, 2);
+    if (!(found > likelihood)) continue;
+    likelihood = found;
+    state = std::move(trial);
   }
 }
 
@@ -174,11 +180,11 @@ bool sharpen_moving_circles(const Fitter& fitter, Search& found, std::uint64_t m
     const double radius_mm = edge_of_curve(edges, edges.model.terms[t]);
     put_edges(fitter, edges, t, std::vector<double>(edges.model.terms[t].blocks.size(), radius_mm));
     std::optional<FitState> best;
-    double most = fitter.log_evidence(found.fit) - cost_of(found.fit.model.terms[t]);
+    double most = fitter.log_evidence(found.fit) - cost_of_circle(found.fit.model.terms[t]);
     const auto try_it = [&](FitState trial) {
       climb(fitter, trial, t, kFirst_mm, moves_of(point_of(trial.model.terms[t]), duration_s), most_work);
       refit(fitter, trial, t);
-      const double value = fitter.log_evidence(trial) - cost_of(trial.model.terms[t]);
+      const double value = fitter.log_evidence(trial) - cost_of_circle(trial.model.terms[t]);
       // Negated, so that a likelihood that is no number is not better.
       if (!(value > most)) return;
       most = value;

@@ -15,6 +15,9 @@ inline constexpr double kCircleSd = 0.3;
 /// Log of the number of choices for one number of a circle.
 inline constexpr double kCircleNumber = 3;
 
+/// Price of the choice of a circle's numbers, nat.
+[[nodiscard]] double cost_of_circle(const Term&);
+
 /// Fits until the likelihood settles: the base speeds move far when a curve becomes a step.
 void settle(const Fitter&, FitState&);
 

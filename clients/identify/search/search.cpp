@@ -101,10 +101,12 @@ bool SearchLoop::accepted(const Finding& best, const ScoreTest::Outcome& outcome
   const Likelihoods likelihoods = likelihoods_now();
   note_ambiguous(best, outcome);
   if (replaced_by_alternative(name)) return true;
+  Alternatives had = std::exchange(alternatives_, {});
   note_alternatives(best, outcome);
   add(best, outcome.threshold_log10_p);
   if (!rose_from(likelihoods, tail)) {
     out_ = before;
+    alternatives_ = std::move(had);
     failed_.insert({Attempt::Kind::kNamed, {name}, tail});
     return false;
   }

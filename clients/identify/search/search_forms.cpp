@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "clients/identify/search/change_points.hpp"
+#include "clients/identify/search/circle_edges.hpp"
 #include "clients/identify/search/moving_circles.hpp"
 #include "clients/identify/search/products.hpp"
 #include "clients/identify/search/search_loop.hpp"
@@ -165,11 +166,14 @@ bool SearchLoop::accept_moving_circle(bool alone) {
     Candidates best;
     add_candidates(dictionary_of_circles(out_.fit, extent_, circles), Attempt::Kind::kCircleForm,
                    least_share * explained, best);
-    if (!best.empty() && fits(std::move(best.begin()->second), attempt) &&
-        fitter_.log_evidence(out_.fit) > evidence + kClose && !(alone && leaves_hypothesis())) {
-      Search circle = std::exchange(out_, before);
-      if (!became_product_of_parts(fitter_.log_evidence(circle.fit))) out_ = std::move(circle);
-      return true;
+    if (!best.empty() && fits(std::move(best.begin()->second), attempt)) {
+      const Term& last = out_.fit.model.terms.back();
+      const double with = fitter_.log_evidence(out_.fit) - (is_moving_circle(last) ? cost_of_circle(last) : 0);
+      if (with > evidence + kClose && !(alone && leaves_hypothesis())) {
+        Search circle = std::exchange(out_, before);
+        if (!became_product_of_parts(with)) out_ = std::move(circle);
+        return true;
+      }
     }
   }
   out_ = before;
