@@ -202,16 +202,25 @@ Factor derivative_of(const Factor& wave, const Basis& basis, const Eigen::Vector
   return slope;
 }
 
-/// A wave that moves by less than half a period in a run stands still if that is as likely: stripes of the floor. Returns
-/// whether it does.
+/// A wave that moves by less than half a period in a run stands still if that is as likely: stripes of the floor. One that hardly moves
+/// may also fit what its harmonics lack: then, standing, it may lose a share of what it explains, as a circle may. Returns whether it
+/// stands.
 bool stand_still(const Fitter& fitter, FitState& state, std::size_t place, double duration_s, double likelihood) {
-  constexpr double kMostLost = 3;  // as the choice of one number costs
-  if (std::abs(wave_of(state.model.terms[place])->points[2]) * duration_s > M_PI) return false;
+  constexpr double kPerNumber = 3;                     // as the choice of one number costs
+  constexpr double kShare = 0.05, kHardly = 1.0 / 12;  // of what it explains; of a period in a run
+  const double moved_rad = std::abs(wave_of(state.model.terms[place])->points[2]) * duration_s;
+  if (moved_rad > M_PI) return false;
+  double may_lose = kPerNumber;
+  if (moved_rad < kHardly * 2 * M_PI) {
+    FitState without = state;
+    without.model.terms.erase(without.model.terms.begin() + static_cast<std::ptrdiff_t>(place));
+    may_lose = std::max(may_lose, kShare * (likelihood - fitter.fit_for_likelihood(without, 1)));
+  }
   FitState trial = state;
   Term& term = trial.model.terms[place];
   wave_of(term)->points[2] = 0;
   term.name = effect_name(kSpeed, "position");
-  if (!(fitter.fit_for_likelihood(trial, 2) > likelihood - kMostLost)) return false;
+  if (!(fitter.fit_for_likelihood(trial, 2) > likelihood - may_lose)) return false;
   state = std::move(trial);
   return true;
 }
