@@ -125,13 +125,13 @@ void settle(const Fitter& fitter, FitState& state) {
 
 void climb(const Fitter& fitter, FitState& state, std::size_t place, double first_mm,
            const std::vector<MoveNumber>& moves, std::uint64_t most_work) {
-  // Smallest move; a smaller one places edges below the tracker's noise.
+  // Smallest move; a smaller one costs a fit per number and places edges below the tracker's noise.
   constexpr double kLast_mm = 0.7;
   double likelihood = fitter.log_likelihood(state);
-  // With all parameters held: a fit for each move would cost ten times as much, and end at the same place.
   const auto moved = [&](const MoveNumber& move, double by_mm) {
     FitState trial = state;
     move(trial.model.terms[place], by_mm);
+    fitter.fit(trial, 2);
     const double found = fitter.log_likelihood(trial);
     // Negated, so that a likelihood that is no number is no progress.
     if (!(found > likelihood)) return false;
@@ -140,16 +140,10 @@ void climb(const Fitter& fitter, FitState& state, std::size_t place, double firs
     return true;
   };
   double step_mm = first_mm;
-  while (step_mm > kLast_mm && state.tracks.work() < most_work) {
-    bool any = false;
-    for (const MoveNumber& move : moves) any = moved(move, step_mm) || moved(move, -step_mm) || any;
+  while (step_mm > kLast_mm) {
+    for (const MoveNumber& move : moves)
+      if (state.tracks.work() < most_work && !moved(move, step_mm)) moved(move, -step_mm);
     step_mm /= 2;
-    if (!any) continue;
-    FitState trial = state;
-    const double found = fitter.fit_for_likelihood(trial, 2);
-    if (!(found > likelihood)) continue;
-    likelihood = found;
-    state = std::move(trial);
   }
 }
 

@@ -103,7 +103,13 @@ bool SearchLoop::accepted(const Finding& best, const ScoreTest::Outcome& outcome
   if (replaced_by_alternative(name)) return true;
   Alternatives had = std::exchange(alternatives_, {});
   note_alternatives(best, outcome);
+  const Search unchanged = out_;
   add(best, outcome.threshold_log10_p);
+  if (const Finding* const other = other_form(best, unchanged.fit.model, outcome)) {
+    Search first = std::exchange(out_, unchanged);
+    add(*other, outcome.threshold_log10_p);
+    if (!(fitter_.log_evidence(out_.fit) > fitter_.log_evidence(first.fit))) out_ = std::move(first);
+  }
   if (!rose_from(likelihoods, tail)) {
     out_ = before;
     alternatives_ = std::move(had);

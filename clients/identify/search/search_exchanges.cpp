@@ -244,6 +244,25 @@ bool SearchLoop::removed(std::size_t t, bool shape_last) {
   return false;
 }
 
+const Finding* SearchLoop::other_form(const Finding& best, const MotionModel& model,
+                                      const ScoreTest::Outcome& outcome) const {
+  const Hypothesis& chosen = hypothesis(best);
+  if (std::any_of(model.terms.begin(), model.terms.end(), [&](const Term& t) { return t.name == chosen.name; }))
+    return nullptr;
+  const auto axis_of = [&](const Hypothesis& h) -> std::optional<Axis> {
+    const Term term = dictionary_.term_of(h, 1);
+    const std::vector<Factor>& factors = term.blocks.front().basis.factors;
+    return factors.empty() ? std::nullopt : std::optional(factors.front().axis);
+  };
+  const Finding* most = nullptr;
+  for (const Finding& f : outcome.findings) {
+    if (f.evidence < kAlternativeShare * best.evidence || !good(f, outcome.threshold_log10_p)) continue;
+    if (hypothesis(f).name != chosen.name || axis_of(hypothesis(f)) == axis_of(chosen)) continue;
+    if (most == nullptr || f.evidence > most->evidence) most = &f;
+  }
+  return most;
+}
+
 void SearchLoop::note_alternatives(const Finding& best, const ScoreTest::Outcome& outcome) {
   const std::string& chosen = hypothesis(best).name;
   alternatives_ = {out_, chosen, {}};

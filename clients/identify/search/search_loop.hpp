@@ -210,6 +210,9 @@ class SearchLoop {
   /// Removes a term unless the evidence falls. The product that takes its share is fitted anew, or the shape of the last term
   /// refined.
   bool removed(std::size_t t, bool shape_last);
+  /// A hypothesis with the name of the best one and nearly its evidence, over another covariate: the neighbours that drive in place of all.
+  /// The linear evidence cannot tell them apart. Null: there is none, or the model has a term of this name.
+  [[nodiscard]] const Finding* other_form(const Finding& best, const MotionModel&, const ScoreTest::Outcome&) const;
   void note_alternatives(const Finding& best, const ScoreTest::Outcome& outcome);
   /// Whether an alternative to the last accepted effect, which is now significant beside it, has more evidence in
   /// its place.
