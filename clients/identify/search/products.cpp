@@ -104,6 +104,40 @@ void about_the_mean(Term& term) {
 
 }  // namespace
 
+std::vector<double> evidence_of_forms(const Fitter& fitter, const FitState& state, std::size_t place,
+                                      const std::vector<std::vector<Block>>& forms) {
+  std::vector<Block> all;
+  for (const std::vector<Block>& form : forms) all.insert(all.end(), form.begin(), form.end());
+  const LocalQuadratic l = local_quadratic(fitter, state, place, all);
+  const Eigen::VectorXd score = l.score_without(state.model.terms[place].coefficients);
+  std::vector<double> evidence;
+  Eigen::Index next = l.own;
+  for (const std::vector<Block>& form : forms) {
+    std::vector<ColumnGroup> groups;
+    std::vector<Eigen::Index> columns;
+    for (const Block& block : form) {
+      ColumnGroup& group = groups.emplace_back();
+      for (const double rough : block.basis.roughness()) {
+        group.columns.push_back(static_cast<Eigen::Index>(columns.size()));
+        group.roughness.push_back(rough);
+        columns.push_back(next++);
+      }
+    }
+    const ReducedColumns data = reduced_columns(l, score, columns);
+    std::vector<Smoothness> smoothness;
+    Eigen::VectorXd sd;
+    evidence.push_back(choose_smoothness(data.information, data.score, groups, smoothness, sd));
+  }
+  return evidence;
+}
+
+double fit_product(const Fitter& fitter, FitState& state, std::size_t place, std::vector<Factor> functions) {
+  ProductFit product(fitter, state, place, std::move(functions));
+  product.fit();
+  fitter.fit_until_settled(state);
+  return fitter.log_evidence(state) - product.cost_of_known();
+}
+
 ProductFit::ProductFit(const Fitter& fitter, FitState& state, std::size_t place, std::vector<Factor> functions)
     : fitter_(fitter),
       state_(state),
@@ -241,36 +275,13 @@ void ProductFit::choose_place_form(std::size_t open) {
   candidates[2].low = map.and_low;
   candidates[2].high = map.and_high;
   std::vector<std::vector<Block>> forms;
-  std::vector<Block> all;
   for (const Factor& one : candidates) {
     functions_[open] = one;
     forms.push_back(blocks_of(open, true));
-    all.insert(all.end(), forms.back().begin(), forms.back().end());
   }
-  const LocalQuadratic l = local_quadratic(fitter_, state_, place_, all);
-  const Eigen::VectorXd score = l.score_without(term().coefficients);
-  std::size_t best = 0;
-  double most = 0;
-  Eigen::Index next = l.own;
-  for (std::size_t f = 0; f < forms.size(); ++f) {
-    std::vector<ColumnGroup> groups;
-    std::vector<Eigen::Index> columns;
-    for (const Block& block : forms[f]) {
-      ColumnGroup& group = groups.emplace_back();
-      for (const double rough : block.basis.roughness()) {
-        group.columns.push_back(static_cast<Eigen::Index>(columns.size()));
-        group.roughness.push_back(rough);
-        columns.push_back(next++);
-      }
-    }
-    const ReducedColumns data = reduced_columns(l, score, columns);
-    std::vector<Smoothness> smoothness;
-    Eigen::VectorXd sd;
-    const double evidence = choose_smoothness(data.information, data.score, groups, smoothness, sd);
-    if (f > 0 && evidence <= most) continue;
-    best = f;
-    most = evidence;
-  }
+  const std::vector<double> evidence = evidence_of_forms(fitter_, state_, place_, forms);
+  const std::size_t best =
+      static_cast<std::size_t>(std::max_element(evidence.begin(), evidence.end()) - evidence.begin());
   functions_[open] = candidates[best];
 }
 

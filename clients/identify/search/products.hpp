@@ -53,6 +53,13 @@ class ProductFit {
   bool place_form_chosen_ = false;
 };
 
+/// Log evidence of each form, some blocks, in place of a term: on the quadratic approximation, with its smoothness at the maximum.
+[[nodiscard]] std::vector<double> evidence_of_forms(const Fitter&, const FitState&, std::size_t term,
+                                                    const std::vector<std::vector<Block>>& forms);
+/// Fits the product of functions in place of a term until it settles. Returns the evidence of the whole model, less the cost of the
+/// functions that it leaves known.
+double fit_product(const Fitter&, FitState&, std::size_t term, std::vector<Factor> functions);
+
 /// Replaces a term over two covariates by the product of two functions if the log likelihood less the complexity rises. A term of
 /// several targets, as a drift, gets an amplitude per target. Returns whether it did.
 bool separate(const Fitter&, FitState&, std::size_t term);

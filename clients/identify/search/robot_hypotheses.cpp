@@ -17,7 +17,7 @@ void add_robot_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   // Robots; with more, only the gains above are tried. A larger value costs a column per robot in each of the hypotheses below.
   constexpr std::size_t kMostForAll = 40;
   if (keys.size() > kMostForAll) return;
-  // Of each wheel pair: robots that tire, and robots whose bias changes or that are replaced.
+  // Robots that tire; robots whose bias changes or that are replaced.
   const Basis slopes{{keyed(Shape::kTable, Covariate::kRobot, keys),
                       over(Shape::kLinear, Covariate::kTime, 0, extent.duration_s, 1)}};
   for (const TargetGroup* group : {&kSpeed, &kTurning})

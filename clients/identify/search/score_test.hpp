@@ -83,8 +83,8 @@ class ScoreTest {
   Eigen::Index own_;  ///< number of columns of base parameters and terms
   Eigen::MatrixXd information_;
   Eigen::VectorXd score_;
-  Eigen::VectorXd prior_,
-      pull_;  ///< of these columns: the diagonal of the prior precision, and the prior's gradient
+  Eigen::VectorXd prior_;  ///< diagonal of the prior precision of these columns
+  Eigen::VectorXd pull_;   ///< gradient of their prior
   /// Folds of the cross-validation.
   struct Folds {
     std::vector<Eigen::MatrixXd> information;

@@ -103,10 +103,11 @@ bool SearchLoop::accepted(const Finding& best, const ScoreTest::Outcome& outcome
   if (replaced_by_alternative(name)) return true;
   Alternatives had = std::exchange(alternatives_, {});
   note_alternatives(best, outcome);
-  const Search unchanged = out_;
+  const Finding* const other = other_form(best, outcome);
+  const std::optional<Search> unchanged = other != nullptr ? std::optional(out_) : std::nullopt;
   add(best, outcome.threshold_log10_p);
-  if (const Finding* const other = other_form(best, unchanged.fit.model, outcome)) {
-    Search first = std::exchange(out_, unchanged);
+  if (unchanged) {
+    Search first = std::exchange(out_, *unchanged);
     add(*other, outcome.threshold_log10_p);
     if (!(fitter_.log_evidence(out_.fit) > fitter_.log_evidence(first.fit))) out_ = std::move(first);
   }
@@ -173,9 +174,10 @@ bool SearchLoop::lag_explains(const Finding& best) {
   constexpr double kMost = 0.8;
   if (fitter_.fit_command_lag(out_.fit, kMost * best.evidence) == 0) return false;
   // Effects that were found beside a wrong clock may be its artefacts: the search starts anew.
-  if (!out_.reasons.empty() && !std::exchange(starts_anew_, true)) {
+  if (!out_.reasons.empty() && !starts_anew_) {
     FitState anew = out_.path.front().fit;
     if (fitter_.fit_command_lag(anew) == 0) return true;
+    starts_anew_ = true;
     out_ = {std::move(anew), {}, {out_.path.front()}, {}, {}, {}, {}};
     failed_.clear();
     alternatives_ = {};

@@ -46,14 +46,18 @@ void SearchLoop::exchange_clocks() {
   for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t) {
     const std::string before = out_.fit.model.terms[t].name;
     if (!exchange_clock(fitter_, out_.fit, t)) continue;
-    std::string from = "motor-time", to = "time";
-    if (before.find(from) == std::string::npos) std::swap(from, to);
-    std::string& name = out_.fit.model.terms[t].name;
-    if (const std::size_t at = before.find(from); at != std::string::npos) name.replace(at, from.size(), to);
-    std::replace(from.begin(), from.end(), '-', '_');
-    std::replace(to.begin(), to.end(), '-', '_');
+    // By whole words: "time" is also in "time-since-command".
     std::vector<std::string>& covariates = out_.reasons[t].covariates;
-    std::replace(covariates.begin(), covariates.end(), from, to);
+    const bool was_motor = std::find(covariates.begin(), covariates.end(), "motor_time") != covariates.end();
+    const std::string from = was_motor ? "-motor-time-" : "-time-", to = was_motor ? "-time-" : "-motor-time-";
+    std::string name = before + "-";
+    std::size_t at = name.find(from);
+    while (at != std::string::npos && name.compare(at, 12, "-time-since-") == 0) at = name.find(from, at + 1);
+    if (at != std::string::npos) name.replace(at, from.size(), to);
+    name.pop_back();
+    out_.fit.model.terms[t].name = name;
+    std::replace(covariates.begin(), covariates.end(), std::string(was_motor ? "motor_time" : "time"),
+                 std::string(was_motor ? "time" : "motor_time"));
     out_.note_renamed(before, name);
     fitter_.fit_contacts(out_.fit);
   }
@@ -244,11 +248,10 @@ bool SearchLoop::removed(std::size_t t, bool shape_last) {
   return false;
 }
 
-const Finding* SearchLoop::other_form(const Finding& best, const MotionModel& model,
-                                      const ScoreTest::Outcome& outcome) const {
+const Finding* SearchLoop::other_form(const Finding& best, const ScoreTest::Outcome& outcome) const {
   const Hypothesis& chosen = hypothesis(best);
-  if (std::any_of(model.terms.begin(), model.terms.end(), [&](const Term& t) { return t.name == chosen.name; }))
-    return nullptr;
+  const std::vector<Term>& terms = out_.fit.model.terms;
+  if (std::any_of(terms.begin(), terms.end(), [&](const Term& t) { return t.name == chosen.name; })) return nullptr;
   const auto axis_of = [&](const Hypothesis& h) -> std::optional<Axis> {
     const Term term = dictionary_.term_of(h, 1);
     const std::vector<Factor>& factors = term.blocks.front().basis.factors;

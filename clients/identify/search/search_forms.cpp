@@ -232,10 +232,7 @@ double SearchLoop::evidence_of_product(std::size_t of_place, std::size_t rising,
   out_.reasons[first].finding.log10_p = std::min(of_both[0].log10_p, of_both[1].log10_p);
   terms.erase(terms.begin() + static_cast<std::ptrdiff_t>(second));
   out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(second));
-  ProductFit product(fitter_, out_.fit, first, std::move(functions));
-  product.fit();
-  fitter_.fit_until_settled(out_.fit);
-  return fitter_.log_evidence(out_.fit) - product.cost_of_known();
+  return fit_product(fitter_, out_.fit, first, std::move(functions));
 }
 
 bool SearchLoop::accept_further_circle() {

@@ -212,7 +212,7 @@ class SearchLoop {
   bool removed(std::size_t t, bool shape_last);
   /// A hypothesis with the name of the best one and nearly its evidence, over another covariate: the neighbours that drive in place of all.
   /// The linear evidence cannot tell them apart. Null: there is none, or the model has a term of this name.
-  [[nodiscard]] const Finding* other_form(const Finding& best, const MotionModel&, const ScoreTest::Outcome&) const;
+  [[nodiscard]] const Finding* other_form(const Finding& best, const ScoreTest::Outcome&) const;
   void note_alternatives(const Finding& best, const ScoreTest::Outcome& outcome);
   /// Whether an alternative to the last accepted effect, which is now significant beside it, has more evidence in
   /// its place.
