@@ -19,8 +19,13 @@ double total_of(const std::vector<FilterBank::Hypothesis>& hypotheses) {
 
 }  // namespace
 
+void FilterBank::take_model(const MotionModel& model) {
+  model_ = &model;
+  for (Hypothesis& h : hypotheses_) h.filter.take_model(model);
+}
+
 void FilterBank::advance_to(double to_s) {
-  const std::vector<Sample>& samples = view_.track->samples;
+  const std::vector<Sample>& samples = view_->track->samples;
   for (; next_ < samples.size() && samples[next_].time_s <= to_s + 1e-6; ++next_) take(samples[next_]);
 }
 
@@ -31,7 +36,7 @@ void FilterBank::take(const Sample& sample) {
   const bool few = hypotheses_.front().spell || hypotheses_.size() <= kFewHeadings;
   for (Hypothesis& h : hypotheses_) h.filter.contacts_displace(few);
   const double weight = total_of(hypotheses_);
-  if (model_.stalls && few)
+  if (model_->stalls && few)
     hypotheses_ = with_spells(sample);
   else
     for (Hypothesis& h : hypotheses_) carry(h, sample);
@@ -49,11 +54,11 @@ bool FilterBank::carry(Hypothesis& h, const Sample& sample) const {
   const double from_s = last_s();
   ContactGate gate;
   bool driven = false;
-  sub_steps(*view_.clock, from_s, sample.time_s, [&](double t, double length, const CommandState& commands) {
-    gate.step(h.filter.step(t, length, commands, view_.neighbours->view(view_.place, std::min(t, from_s))));
+  sub_steps(*view_->clock, from_s, sample.time_s, [&](double t, double length, const CommandState& commands) {
+    gate.step(h.filter.step(t, length, commands, view_->neighbours->view(view_->place, std::min(t, from_s))));
     driven = driven || commands.driven();
   });
-  const Innovation innovation = h.filter.update(sample, view_.clock->at(sample.time_s - 1e-9));
+  const Innovation innovation = h.filter.update(sample, view_->clock->at(sample.time_s - 1e-9));
   h.distance2 = innovation.distance2;
   h.lost = innovation.lost && innovation.size == 2;
   h.log_weight += innovation.log_likelihood;
@@ -62,7 +67,7 @@ bool FilterBank::carry(Hypothesis& h, const Sample& sample) const {
 }
 
 std::vector<FilterBank::Hypothesis> FilterBank::with_spells(const Sample& sample) const {
-  const Stalls& stalls = *model_.stalls;
+  const Stalls& stalls = *model_->stalls;
   const double length_s = sample.time_s - last_s(), share = std::clamp(stalls.share(), 1e-6, 0.5);
   std::vector<Hypothesis> before, after;
   for (const Hypothesis& h : hypotheses_) {
@@ -100,15 +105,15 @@ std::vector<FilterBank::Hypothesis> FilterBank::with_spells(const Sample& sample
 }
 
 void FilterBank::start(const Sample& sample) {
-  RobotBias bias = model_.bias_of(view_.track->robot);
+  RobotBias bias = model_->bias_of(view_->track->robot);
   hypotheses_.clear();
   const auto add = [&](double heading, double sd) {
-    TrackFilter filter(model_, bias, view_.track->robot, view_.number);
+    TrackFilter filter(*model_, bias, view_->track->robot, view_->number);
     filter.start(sample, {}, heading, sd);
     filter.stay_within_walls();
     hypotheses_.push_back({std::move(filter)});
   };
-  if (TrackFilter::has_heading(sample)) return add(sample.heading_rad, std::sqrt(model_.noise.heading_rad2));
+  if (TrackFilter::has_heading(sample)) return add(sample.heading_rad, std::sqrt(model_->noise.heading_rad2));
   // Headings to start from, 20 degrees apart; each costs a filter, fewer may miss the true one.
   constexpr int kHeadings = 18;
   for (int i = 0; i < kHeadings; ++i) add(2 * M_PI * i / kHeadings, M_PI / kHeadings);

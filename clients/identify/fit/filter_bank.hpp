@@ -14,13 +14,15 @@ namespace kilotwin::identify {
 class FilterBank {
  public:
   /// Both must outlive the bank.
-  FilterBank(const MotionModel& model, const TrackView& view) : model_(model), view_(view) {}
+  FilterBank(const MotionModel& model, const TrackView& view) : model_(&model), view_(&view) {}
 
+  /// Continues under another model of the same robot, which must outlive the bank.
+  void take_model(const MotionModel&);
   /// Processes all samples up to this time.
   void advance_to(double to_s);
   [[nodiscard]] bool started() const { return next_ > 0; }
   /// Time of the last processed sample, s.
-  [[nodiscard]] double last_s() const { return view_.track->samples[next_ - 1].time_s; }
+  [[nodiscard]] double last_s() const { return view_->track->samples[next_ - 1].time_s; }
 
   struct Hypothesis {
     TrackFilter filter;
@@ -30,7 +32,7 @@ class FilterBank {
     bool lost = false;                               ///< whether it lost the track there
   };
   [[nodiscard]] const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
-  [[nodiscard]] const TrackView& view() const { return view_; }
+  [[nodiscard]] const TrackView& view() const { return *view_; }
   /// Of all processed samples.
   [[nodiscard]] double log_likelihood() const { return log_likelihood_; }
 
@@ -46,8 +48,8 @@ class FilterBank {
   void prune();
   void merge();
 
-  const MotionModel& model_;
-  const TrackView& view_;
+  const MotionModel* model_;
+  const TrackView* view_;
   std::vector<Hypothesis> hypotheses_;
   std::size_t next_ = 0;
   double log_likelihood_ = 0;

@@ -72,6 +72,12 @@ class TrackFilter {
 
   TrackFilter(const MotionModel& model, const RobotBias& bias, std::uint32_t robot, std::uint32_t run);
 
+  /// Continues under another model of the same robot: what is believed of pose and biases stays.
+  void take_model(const MotionModel& model) {
+    model_ = &model;
+    sums_ = BlockSums(model);
+  }
+
   /// Initialises the filter at the first sample. Measurement effects are removed. `at` is not used.
   void start(const Sample&, const Situation& at, double heading_rad, double heading_sd_rad);
   [[nodiscard]] static bool has_heading(const Sample& sample) { return !std::isnan(sample.heading_rad); }

@@ -6,6 +6,7 @@
 #include <deque>
 #include <iterator>
 #include <limits>
+#include <memory>
 #include <optional>
 
 #include "clients/identify/fit/filter_bank.hpp"
@@ -406,13 +407,14 @@ class RunForecasts {
     const MotionModel* model;
     std::vector<FilterBank> banks;
     TrafficGrids grids;
+    std::shared_ptr<const MotionModel> own = nullptr;  ///< the model of a drifting amplitude
     [[nodiscard]] std::vector<const FilterBank*> pointers() const {
       std::vector<const FilterBank*> all;
       for (const FilterBank& bank : banks) all.push_back(&bank);
       return all;
     }
   };
-  /// A start, with the one or two models between whose forecasts the result lies.
+  /// A start, with the one or two models between whose forecasts the result lies. A drifting amplitude has one.
   struct Start {
     double time_s;  ///< that is predicted
     std::uint32_t number;
@@ -437,23 +439,50 @@ class RunForecasts {
     for (std::size_t k = 0; k < instants_s.size(); ++k) {
       std::vector<double> log_likelihood(models_.size(), 0.0);
       for (std::size_t i = 0; i < states.size(); ++i) log_likelihood[i / robots] += states[i][k].log_likelihood();
-      const RunAmplitude::Between between = models_.size() > 1
-                                                ? drifting_.mean(instants_s[k] - times_.horizon_s, log_likelihood)
-                                                : RunAmplitude::Between{};
+      const double now_s = instants_s[k] - times_.horizon_s;
+      DriftingAmplitude::Known amplitude;
+      if (models_.size() > 1) {
+        amplitude = drifting_.at(now_s, times_.horizon_s, log_likelihood);
+        follow(amplitude.passed, now_s);
+      }
+      const RunAmplitude::Between& between = amplitude.constant;
       Start& start =
           starts.emplace_back(Start{instants_s[k], static_cast<std::uint32_t>(first + k), {}, between.part});
+      if (amplitude.ahead) {
+        start.known.push_back(followed(*amplitude.ahead, now_s));
+        continue;
+      }
       const auto add = [&](std::size_t m) {
         std::vector<FilterBank> banks;
         banks.reserve(robots);
         for (std::size_t r = 0; r < robots; ++r) banks.push_back(std::move(states[m * robots + r][k]));
         Known& known =
             start.known.emplace_back(Known{&models_[m].model, std::move(banks), TrafficGrids(models_[m].model)});
-        known.grids = models_[m].traffic.at(instants_s[k] - times_.horizon_s, known.pointers());
+        known.grids = models_[m].traffic.at(now_s, known.pointers());
       };
       add(between.low);
       if (between.high != between.low) add(between.high);
     }
     return starts;
+  }
+  /// Carries the filters of a drifting amplitude on to an instant. It was at this place of the raster since the last one.
+  void follow(double place, double to_s) {
+    auto model = std::make_shared<const MotionModel>(amplitude_.model_at(place));
+    if (followed_.empty())
+      for (const TrackView* view : views_) followed_.emplace_back(*model, *view);
+    pool_.for_each(followed_.size(), [&](std::size_t i) {
+      followed_[i].take_model(*model);
+      followed_[i].advance_to(to_s);
+    });
+    followed_model_ = std::move(model);
+  }
+  /// The filters of a drifting amplitude, under the model of its mean ahead.
+  Known followed(double place, double now_s) {
+    auto model = std::make_shared<const MotionModel>(amplitude_.model_at(place));
+    Known known{model.get(), followed_, TrafficGrids(*model), model};
+    for (FilterBank& bank : known.banks) bank.take_model(*model);
+    known.grids = models_.front().traffic.at(now_s, known.pointers());
+    return known;
   }
   [[nodiscard]] std::vector<Forecast> forecasts_from(const Start& start) const {
     std::vector<Forecast> seen = forecasts_by(start.known.front(), start);
@@ -504,6 +533,8 @@ class RunForecasts {
   const bool all_, neighbours_;
   const RunAmplitude amplitude_;
   DriftingAmplitude drifting_{amplitude_};
+  std::vector<FilterBank> followed_;  ///< under the amplitude as it was at each time, as far as it was known then
+  std::shared_ptr<const MotionModel> followed_model_;
   std::deque<RunModel> models_;
 };
 

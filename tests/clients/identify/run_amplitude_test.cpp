@@ -77,33 +77,45 @@ TEST(RunAmplitude, ThePosteriorFollowsTheData) {
   }
 }
 
-/// Log likelihoods of the models of a run whose gain is `truth(time)`: ten samples of sd 0.02 every 5 s.
+/// Of a run whose gain is `truth(time)`: ten samples of sd 0.02 every 5 s.
 template <class Truth>
-double gain_at_the_end(const RunAmplitude& amplitude, double end_s, const Truth& truth, bool drifting) {
+DriftingAmplitude::Known known_at(const RunAmplitude& amplitude, double end_s, double ahead_s, const Truth& truth) {
   DriftingAmplitude follows(amplitude);
   std::vector<double> log_likelihood(amplitude.models().size(), 0);
-  RunAmplitude::Between mean;
+  DriftingAmplitude::Known known;
   for (double time_s = 5; time_s <= end_s; time_s += 5) {
     for (std::size_t i = 0; i < log_likelihood.size(); ++i)
       log_likelihood[i] -= 10 * 0.5 * std::pow((gain_of(amplitude.models()[i], 9) - truth(time_s)) / 0.02, 2);
-    mean = follows.mean(time_s, log_likelihood);
+    known = follows.at(time_s, ahead_s, log_likelihood);
   }
-  if (!drifting) mean = amplitude.mean(log_likelihood);
-  const double low = gain_of(amplitude.models()[mean.low], 9), high = gain_of(amplitude.models()[mean.high], 9);
-  return low + mean.part * (high - low);
+  return known;
 }
 
-TEST(RunAmplitude, ADriftIsFollowed) {
+TEST(RunAmplitude, ASteadyDriftIsFollowedWithoutLag) {
   const RunAmplitude amplitude(with_speeds_of_runs({-0.1, 0.2, 0.05, -0.03}), 9);
   const auto falls = [](double time_s) { return 0.2 - 0.4 * time_s / 200; };
-  EXPECT_GT(gain_at_the_end(amplitude, 200, falls, false), -0.02);  // the mean over the run
-  EXPECT_LT(gain_at_the_end(amplitude, 200, falls, true), -0.1);
+  const DriftingAmplitude::Known known = known_at(amplitude, 200, 10, falls);
+  ASSERT_TRUE(known.ahead.has_value());
+  EXPECT_NEAR(gain_of(amplitude.model_at(*known.ahead), 9), falls(205), 0.01);
+  EXPECT_NEAR(gain_of(amplitude.model_at(known.passed), 9), falls(197.5), 0.01);
+}
+
+TEST(RunAmplitude, AWaveIsFollowed) {
+  const RunAmplitude amplitude(with_speeds_of_runs({-0.1, 0.2, 0.05, -0.03}), 9);
+  const auto wave = [](double time_s) { return 0.15 * std::sin(2 * M_PI * time_s / 340); };
+  for (const double end_s : {120.0, 170.0, 255.0, 300.0}) {
+    const DriftingAmplitude::Known known = known_at(amplitude, end_s, 10, wave);
+    ASSERT_TRUE(known.ahead.has_value()) << end_s;
+    EXPECT_NEAR(gain_of(amplitude.model_at(*known.ahead), 9), wave(end_s + 5), 0.015) << end_s;
+  }
 }
 
 TEST(RunAmplitude, WithoutDriftTheWholePastCounts) {
   const RunAmplitude amplitude(with_speeds_of_runs({-0.1, 0.2, 0.05, -0.03}), 9);
   const auto noisy = [](double time_s) { return 0.07 + 0.006 * std::cos(7.3 * time_s); };
-  EXPECT_EQ(gain_at_the_end(amplitude, 200, noisy, true), gain_at_the_end(amplitude, 200, noisy, false));
+  const DriftingAmplitude::Known known = known_at(amplitude, 200, 10, noisy);
+  EXPECT_FALSE(known.ahead.has_value());
+  EXPECT_NEAR(gain_of(amplitude.model_at(known.passed), 9), 0.07, 0.002);
 }
 
 TEST(RunAmplitude, ARunOutsideTheFitHasACourseOfItsOwn) {
