@@ -148,9 +148,12 @@ void climb(const Fitter& fitter, FitState& state, std::size_t place, double firs
     while (steps < kMost && state.tracks.work() < most_work && moved(move, by_mm)) ++steps;
     return steps > 0;
   };
-  for (double step_mm = first_mm; step_mm > kLast_mm; step_mm /= 2)
+  double step_mm = first_mm;
+  while (step_mm > kLast_mm) {
     for (const MoveNumber& move : moves)
       if (!moved_on(move, step_mm)) moved_on(move, -step_mm);
+    step_mm /= 2;
+  }
 }
 
 void put_edges(const Fitter& fitter, FitState& state, std::size_t place, const std::vector<double>& radii_mm) {
