@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "core/stats/clusters.hpp"
 #include "core/stats/distributions.hpp"
 #include "core/stats/moments.hpp"
 #include "tests/identify/truth/dice.hpp"
@@ -153,7 +154,7 @@ Scene with_drawn_parameters(Scene scene, std::uint64_t seed) {
 
 void Coverage::add_interval(const std::string& set, const std::string& parameter, double truth, double low,
                             double high) {
-  Share& share = intervals_[parameter];
+  Share& share = intervals_[parameter][set];
   const bool holds = low <= truth && truth <= high;
   if (!holds) fmt::print("{}: {} is {:.6g}, not in {:.6g}..{:.6g}\n", set, parameter, truth, low, high);
   share.held += holds ? 1 : 0;
@@ -250,15 +251,23 @@ Coverage::Share Coverage::points_of(const std::string& band) const {
 }
 
 Coverage::Share Coverage::intervals_of(const std::string& parameter) const {
-  const auto found = intervals_.find(parameter);
-  return found == intervals_.end() ? Share{} : found->second;
+  Share sum;
+  const auto sets = intervals_.find(parameter);
+  if (sets == intervals_.end()) return sum;
+  for (const auto& [set, share] : sets->second) sum = {sum.held + share.held, sum.all + share.all};
+  return sum;
 }
 
 void Coverage::print() const {
-  for (const auto& [parameter, share] : intervals_) {
-    const auto [low, high] = stats::wilson_interval(share.held, share.all);
+  for (const auto& [parameter, sets] : intervals_) {
+    // The intervals of one set depend on each other.
+    std::vector<stats::Cluster> clusters;
+    for (const auto& [set, share] : sets)
+      clusters.push_back({static_cast<double>(share.held), static_cast<double>(share.all)});
+    const auto [low, high] = stats::wilson_interval(clusters);
+    const Share all = intervals_of(parameter);
     fmt::print("{:24} {:5} of {:5} intervals hold the truth: {:.1f} %, 95 % interval {:.1f} to {:.1f}\n", parameter,
-               share.held, share.all, 100.0 * share.held / share.all, 100 * low, 100 * high);
+               all.held, all.all, 100.0 * all.held / all.all, 100 * low, 100 * high);
   }
   for (const auto& [band, sets] : bands_) {
     // The points of one band depend on each other: the sets are the sample.

@@ -36,7 +36,7 @@ class Coverage {
   /// The true numbers of effects: centres, instants.
   void add_numbers(const Scene&, const nlohmann::json& result);
   void add_walls(const Scene&, const nlohmann::json& result);
-  std::map<std::string, Share> intervals_;
+  std::map<std::string, std::map<std::string, Share>> intervals_;  ///< by parameter, then by set
   /// By scene and effect found: the points of each set's band.
   std::map<std::string, std::vector<Share>> bands_;
   /// By scene: sets without a band to compare. The effect found has none, or is not the only one, or acts otherwise than the truth.

@@ -1,8 +1,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 #include <vector>
 
+#include "core/stats/clusters.hpp"
 #include "core/stats/distributions.hpp"
 #include "core/stats/moments.hpp"
 #include "core/stats/quantiles.hpp"
@@ -111,6 +113,37 @@ TEST(WilsonInterval, HoldsTheProbabilityAsOftenAsStated) {
   }
   EXPECT_EQ(wilson_interval(0, 50).first, 0);
   EXPECT_EQ(wilson_interval(50, 50).second, 1);
+}
+
+TEST(WilsonInterval, OfClustersAllowsForTheirDependence) {
+  // Clusters of 8 trials with one probability each: 1 or 0.6, 0.9 on average.
+  constexpr int kSets = 2000, kClusters = 60, kTrials = 8;
+  constexpr double kMean = 0.9;
+  std::mt19937_64 random(5);
+  const auto below = [&](double p) { return static_cast<double>(random() >> 11) * 0x1p-53 < p; };
+  int held = 0, held_if_independent = 0;
+  for (int set = 0; set < kSets; ++set) {
+    std::vector<Cluster> clusters;
+    double hits = 0;
+    for (int c = 0; c < kClusters; ++c) {
+      const double probability = below(0.75) ? 1 : 0.6;
+      Cluster& cluster = clusters.emplace_back(Cluster{0, kTrials});
+      for (int t = 0; t < kTrials; ++t) cluster.hits += below(probability) ? 1 : 0;
+      hits += cluster.hits;
+    }
+    const auto [low, high] = wilson_interval(clusters);
+    held += low <= kMean && kMean <= high ? 1 : 0;
+    const auto [narrow_low, narrow_high] = wilson_interval(hits, kClusters * kTrials);
+    held_if_independent += narrow_low <= kMean && kMean <= narrow_high ? 1 : 0;
+  }
+  EXPECT_GT(held, 0.93 * kSets);
+  EXPECT_LT(held, 0.98 * kSets);
+  EXPECT_LT(held_if_independent, 0.88 * kSets);
+  // One trial per cluster: the plain interval, but for Student's distribution.
+  std::vector<Cluster> single(100, Cluster{1, 1});
+  EXPECT_EQ(wilson_interval(single), wilson_interval(100, 100));
+  for (int i = 0; i < 10; ++i) single[static_cast<std::size_t>(i)].hits = 0;
+  EXPECT_NEAR(wilson_interval(single).first, wilson_interval(90, 100).first, 0.003);
 }
 
 TEST(PoissonInterval, HoldsTheMeanInAtLeast95PercentOfCases) {
