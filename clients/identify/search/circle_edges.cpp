@@ -116,8 +116,7 @@ void settle(const Fitter& fitter, FitState& state) {
   constexpr int kMostFits = 6;
   double before = -1e300;
   for (int i = 0; i < kMostFits; ++i) {
-    fitter.fit(state, 2);
-    const double now = fitter.log_likelihood(state);
+    const double now = fitter.fit_for_likelihood(state, 2);
     if (!(now > before + 1)) return;
     before = now;
   }
@@ -134,8 +133,7 @@ void climb(const Fitter& fitter, FitState& state, std::size_t place, double firs
     // A fit has settled before each move: a small move that pays does so with the other numbers held, too, at a fraction of the cost.
     // Negated, so that a likelihood that is no number is no progress.
     if (!(fitter.log_likelihood(trial) > likelihood)) return false;
-    fitter.fit(trial, 2);
-    const double found = fitter.log_likelihood(trial);
+    const double found = fitter.fit_for_likelihood(trial, 2);
     if (!(found > likelihood)) return false;
     likelihood = found;
     state = std::move(trial);
