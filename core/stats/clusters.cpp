@@ -18,7 +18,7 @@ std::pair<double, double> wilson_interval(std::span<const Cluster> clusters) {
     square += off * off;
   }
   double independent = count;
-  if (square > 0 && share > 0 && share < 1) {
+  if (count > 1 && square > 0 && share > 0 && share < 1) {
     const double variance = square * count / (count - 1) / (trials * trials),
                  narrower = kNormal95 / student_quantile(0.975, count - 1);
     independent = share * (1 - share) / variance * narrower * narrower;

@@ -133,6 +133,8 @@ TEST(RunAmplitude, ARunOutsideTheFitHasACourseOfItsOwn) {
   EXPECT_EQ(RunAmplitude(model, 1).models().size(), 1u);
   const RunAmplitude amplitude(model, 9);
   ASSERT_EQ(amplitude.models().size(), 13u);
+  EXPECT_TRUE(amplitude.over_time());
+  EXPECT_FALSE(RunAmplitude(with_speeds_of_runs({0, 0.2}), 9).over_time());
   EXPECT_NEAR(gain_of(amplitude.models()[6], 9), 0, 1e-12);
   // The root mean square of 0.2 cos over whole half-waves, for two runs: times sqrt(2 (1 + 1/2)), at four standard deviations.
   EXPECT_NEAR(gain_of(amplitude.models()[12], 9), 4 * 0.2 / std::sqrt(2) * std::sqrt(3), 1e-6);

@@ -139,6 +139,9 @@ TEST(WilsonInterval, OfClustersAllowsForTheirDependence) {
   EXPECT_GT(held, 0.93 * kSets);
   EXPECT_LT(held, 0.98 * kSets);
   EXPECT_LT(held_if_independent, 0.88 * kSets);
+  // A single cluster counts as one trial, whatever the rounding of its share.
+  for (int hits = 1; hits < 49; ++hits)
+    EXPECT_EQ(wilson_interval(std::vector<Cluster>{{1.0 * hits, 49}}), wilson_interval(hits / 49.0, 1)) << hits;
   // One trial per cluster: the plain interval, but for Student's distribution.
   std::vector<Cluster> single(100, Cluster{1, 1});
   EXPECT_EQ(wilson_interval(single), wilson_interval(100, 100));
